@@ -1,0 +1,180 @@
+//! The GGX microfacet distribution (Walter 2007, Heitz 2014): D, Smith Λ, G1, G2, visible-normal sampling, and their
+//! derivatives by α.
+//!
+//! Angles come as [`Incidence`] against the mean normal, so that D = α²/(π (α²c² + s²)²) and Λ hold to a few ulp down to
+//! α = 1e-6. The limit α → 0 is the mirror: D cos θ_h tends to a delta at the normal, Λ to 0, a sampled facet to the
+//! normal itself; [`crate::integral::mirror`] is that limit in closed form.
+
+use crate::{Incidence, OpticsError};
+use core::f64::consts::{FRAC_1_PI, TAU};
+use glam::DVec3;
+
+/// Smallest roughness: below it the lobe (0.1 mrad at 1e-4 already) is a mirror to any camera.
+pub const MIN_ALPHA: f64 = 1e-6;
+
+/// How masking of ω_o and shadowing of ω_i combine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Masking {
+    /// G2 = 1/(1 + Λ_i + Λ_o), height-correlated (Heitz 2014, eq. 99).
+    #[default]
+    HeightCorrelated,
+    /// G2 = G1(ω_i) G1(ω_o) (Walter 2007; Mitsuba).
+    Separable,
+}
+
+/// An isotropic GGX surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ggx {
+    alpha: f64,
+    masking: Masking,
+}
+
+impl Ggx {
+    /// Roughness α in [1e-6, 1].
+    ///
+    /// # Errors
+    /// [`OpticsError::Roughness`] outside it.
+    pub fn new(alpha: f64, masking: Masking) -> Result<Self, OpticsError> {
+        if (MIN_ALPHA..=1.0).contains(&alpha) {
+            Ok(Self { alpha, masking })
+        } else {
+            Err(OpticsError::Roughness(alpha))
+        }
+    }
+
+    /// α.
+    #[must_use]
+    pub fn alpha(&self) -> f64 {
+        self.alpha
+    }
+
+    /// How masking and shadowing combine.
+    #[must_use]
+    pub fn masking(&self) -> Masking {
+        self.masking
+    }
+
+    /// D(h), per steradian; 0 for facets that look down. ∫ D cos θ_h dω = 1.
+    #[must_use]
+    pub fn d(&self, h: Incidence) -> f64 {
+        if h.cosine <= 0.0 {
+            return 0.0;
+        }
+        let a2 = self.alpha * self.alpha;
+        FRAC_1_PI * a2 / (a2 * h.cosine * h.cosine + h.sine_squared).powi(2)
+    }
+
+    /// ∂D/∂α = 2α (s² − α²c²)/(π (α²c² + s²)³).
+    #[must_use]
+    pub fn d_by_alpha(&self, h: Incidence) -> f64 {
+        if h.cosine <= 0.0 {
+            return 0.0;
+        }
+        let b = (self.alpha * h.cosine).powi(2);
+        2.0 * FRAC_1_PI * self.alpha * (h.sine_squared - b) / (b + h.sine_squared).powi(3)
+    }
+
+    /// Smith Λ = x/(2 (1 + √(1 + x))), x = α² tan² θ; infinite at and below the horizon.
+    #[must_use]
+    pub fn lambda(&self, v: Incidence) -> f64 {
+        if v.cosine <= 0.0 {
+            return f64::INFINITY;
+        }
+        // With r = √(c² + α²s²): Λ = α²s²/(2c (c + r)), free of tan².
+        0.5 * self.alpha * self.alpha * v.sine_squared / (v.cosine * (v.cosine + self.slant(v)))
+    }
+
+    /// ∂Λ/∂α = α s²/(2c √(c² + α²s²)).
+    #[must_use]
+    pub fn lambda_by_alpha(&self, v: Incidence) -> f64 {
+        if v.cosine <= 0.0 { 0.0 } else { 0.5 * self.alpha * v.sine_squared / (v.cosine * self.slant(v)) }
+    }
+
+    /// G1 = 1/(1 + Λ), in [0, 1].
+    #[must_use]
+    pub fn g1(&self, v: Incidence) -> f64 {
+        if v.cosine <= 0.0 { 0.0 } else { 2.0 * v.cosine / (v.cosine + self.slant(v)) }
+    }
+
+    /// G2 in [0, 1]; 0 if either direction is at or below the horizon.
+    #[must_use]
+    pub fn g2(&self, i: Incidence, o: Incidence) -> f64 {
+        if i.cosine <= 0.0 || o.cosine <= 0.0 {
+            return 0.0;
+        }
+        match self.masking {
+            Masking::HeightCorrelated => 1.0 / (1.0 + self.lambda(i) + self.lambda(o)),
+            Masking::Separable => self.g1(i) * self.g1(o),
+        }
+    }
+
+    /// G2/(4 cos θ_i cos θ_o), which stays finite where the cosines vanish: with r = √(c² + α²s²),
+    /// 1/(2 (c_o r_i + c_i r_o)) height-correlated, 1/((c_i + r_i)(c_o + r_o)) separable.
+    #[must_use]
+    pub fn visibility(&self, i: Incidence, o: Incidence) -> f64 {
+        if i.cosine <= 0.0 || o.cosine <= 0.0 {
+            return 0.0;
+        }
+        let (ri, ro) = (self.slant(i), self.slant(o));
+        match self.masking {
+            Masking::HeightCorrelated => 0.5 / (o.cosine * ri + i.cosine * ro),
+            Masking::Separable => 1.0 / ((i.cosine + ri) * (o.cosine + ro)),
+        }
+    }
+
+    /// ∂/∂α of [`Self::visibility`].
+    #[must_use]
+    pub fn visibility_by_alpha(&self, i: Incidence, o: Incidence) -> f64 {
+        if i.cosine <= 0.0 || o.cosine <= 0.0 {
+            return 0.0;
+        }
+        let v = self.visibility(i, o);
+        let (ri, ro) = (self.slant(i), self.slant(o));
+        // ∂r/∂α = α s²/r.
+        let (di, dr) = (self.alpha * i.sine_squared / ri, self.alpha * o.sine_squared / ro);
+        match self.masking {
+            Masking::HeightCorrelated => -2.0 * v * v * (o.cosine * di + i.cosine * dr),
+            Masking::Separable => -v * (di / (i.cosine + ri) + dr / (o.cosine + ro)),
+        }
+    }
+
+    /// A facet normal visible from `wo`, both in the local frame (mean normal +z, `wo.z > 0`), for (u1, u2) in [0, 1)².
+    ///
+    /// Density: [`Self::visible_density`]. Smooth in α and `wo` for fixed (u1, u2). Spherical caps: Dupuy and Benyoub
+    /// 2023, "Sampling Visible GGX Normals with Spherical Caps", listing 3, with sin² and z + w_z rewritten so that
+    /// α → 0 and grazing views lose no digits.
+    #[must_use]
+    pub fn sample_visible(&self, wo: DVec3, [u1, u2]: [f64; 2]) -> DVec3 {
+        let w = DVec3::new(self.alpha * wo.x, self.alpha * wo.y, wo.z).normalize();
+        let height = (1.0 - u2) * (1.0 + w.z);
+        // The cap point has z = height − w_z; 1 − z = u2 (1 + w_z) and 1 + z = height + (1 − w_z).
+        let below = (w.x * w.x + w.y * w.y) / (1.0 + w.z);
+        let sine = (u2 * (1.0 + w.z) * (height + below)).sqrt();
+        let (sin_phi, cos_phi) = (TAU * u1).sin_cos();
+        let h = DVec3::new(self.alpha * (sine * cos_phi + w.x), self.alpha * (sine * sin_phi + w.y), height);
+        // height = 0 only at the very rim of the cap (u2 → 1): a vertical facet.
+        h.try_normalize().unwrap_or(DVec3::Z)
+    }
+
+    /// Density per steradian of h of [`Self::sample_visible`]: G1(ω_o) D(h) (ω_o·h)/(n·ω_o). For ω_i mirrored at h divide
+    /// by 4 (ω_o·h).
+    #[must_use]
+    pub fn visible_density(&self, o: Incidence, h: Incidence, o_dot_h: f64) -> f64 {
+        if o.cosine <= 0.0 {
+            return 0.0;
+        }
+        // G1/c = 2/(c + r) has no pole at grazing.
+        2.0 * self.d(h) * o_dot_h.max(0.0) / (o.cosine + self.slant(o))
+    }
+
+    /// G2/G1(ω_o), the weight f_r (n·ω_i)/density of a sampled visible normal, in [0, 1]; finite at grazing ω_o.
+    #[must_use]
+    pub fn visible_weight(&self, i: Incidence, o: Incidence) -> f64 {
+        2.0 * i.cosine * (o.cosine + self.slant(o)) * self.visibility(i, o)
+    }
+
+    /// r = √(c² + α²s²) = c (1 + 2Λ).
+    fn slant(&self, v: Incidence) -> f64 {
+        (v.cosine * v.cosine + self.alpha * self.alpha * v.sine_squared).sqrt()
+    }
+}
