@@ -7,7 +7,7 @@ use crate::memory::Memory;
 use heapless::Vec;
 use protocol_polar::MAX_FRAMES;
 use protocol_polar::fixed::{StokesPlan, Word};
-use protocol_wire::{CaptureId, MAX_PLANES, PlaneInfo, PlaneKind, SensorInfo};
+use protocol_wire::{Calibration, CaptureId, MAX_PLANES, PlaneInfo, PlaneKind, SensorInfo};
 
 /// Where a strip lies on the sensor.
 #[derive(Clone, Copy, Debug)]
@@ -70,14 +70,18 @@ pub(crate) fn preview_step(sensor: &SensorInfo) -> u16 {
     step
 }
 
+/// What decides which planes a capture has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Contents {
+    pub word: Word,
+    pub frames: usize,
+    pub keep_raw: bool,
+    pub calibration: Calibration,
+}
+
 /// The planes of a capture, in the order they are stored.
-pub(crate) fn planes(
-    sensor: &SensorInfo,
-    strip_rows: u16,
-    word: Word,
-    frames: usize,
-    keep_raw: bool,
-) -> Vec<PlaneInfo, MAX_PLANES> {
+pub(crate) fn planes(sensor: &SensorInfo, strip_rows: u16, contents: Contents) -> Vec<PlaneInfo, MAX_PLANES> {
+    let Contents { word, frames, keep_raw, calibration } = contents;
     let strips = u16::try_from(sensor.height.div_ceil(strip_rows.max(1).into())).unwrap_or(u16::MAX);
     let full = |kind, value_bytes| PlaneInfo {
         kind,
@@ -110,6 +114,12 @@ pub(crate) fn planes(
         for slot in (0_u8..).take(frames) {
             add(full(PlaneKind::Raw(slot), 2));
         }
+        if calibration.dark_map {
+            add(full(PlaneKind::DarkMap, 2));
+        }
+        if calibration.flat_map {
+            add(full(PlaneKind::FlatMap, 2));
+        }
     }
     planes
 }
@@ -125,8 +135,7 @@ pub(crate) struct Recipe<'a> {
     pub plan: &'a StokesPlan,
     pub keep_raw: bool,
     pub black_level: u16,
-    pub dark_map: bool,
-    pub flat_map: bool,
+    pub calibration: Calibration,
     pub preview_step: u16,
 }
 
@@ -148,11 +157,19 @@ pub(crate) fn compute_strip(
         }
         inputs.push(samples).map_err(|_| ComputeError::Memory)?;
     }
-    let dark = match (recipe.dark_map, memory.dark.get(area.range())) {
+    let dark = match (recipe.calibration.dark_map, memory.dark.get(area.range())) {
         (true, Some(values)) => Dark::Map(values),
         _ => Dark::Level(recipe.black_level),
     };
-    let flat = if recipe.flat_map { memory.flat.get(area.range()) } else { None };
+    let flat = if recipe.calibration.flat_map { memory.flat.get(area.range()) } else { None };
+    if recipe.keep_raw {
+        if let Dark::Map(map) = dark {
+            store_values(store, recipe.id, PlaneKind::DarkMap, area.strip, map, memory.bytes)?;
+        }
+        if let Some(map) = flat {
+            store_values(store, recipe.id, PlaneKind::FlatMap, area.strip, map, memory.bytes)?;
+        }
+    }
     let input = StripInput { frames: &inputs, dark, flat };
     let flags = memory.flags.get_mut(..n).ok_or(ComputeError::Memory)?;
     let table = &mut *memory.weights;

@@ -6,7 +6,9 @@
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
     clippy::cast_sign_loss,
-    reason = "tests choose numbers that fit"
+    clippy::unwrap_used,
+    clippy::needless_range_loop,
+    reason = "tests choose numbers that fit, and follow the formula's indices"
 )]
 
 use num_bigint::BigInt;

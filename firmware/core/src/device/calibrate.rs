@@ -5,7 +5,7 @@ use crate::compute::Area;
 use crate::hardware::{CaptureStore, FrameSource, Micros, Wheel, text};
 use protocol_polar::Degrees;
 use protocol_polar::fixed::GainQ15;
-use protocol_wire::{Calibrate, Progress, Refusal, Stage};
+use protocol_wire::{Calibrate, Calibration, Progress, Refusal, Stage};
 
 /// A calibration under way.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +35,7 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
     ) -> Result<Option<CalibrationJob>, Refusal> {
         let (flat, frames) = match what {
             Calibrate::Clear => {
-                (self.dark_map, self.flat_map) = (false, false);
+                self.calibration = Calibration { dark_map: false, flat_map: false };
                 return Ok(None);
             }
             Calibrate::Dark { frames } => (false, frames),
@@ -69,7 +69,7 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
     }
 
     fn make_dark(&mut self, frames: u8) -> Result<(), Refusal> {
-        self.dark_map = false;
+        self.calibration.dark_map = false;
         let white = self.setup.sensor.white_level_dn;
         let mut sum = 0_u64;
         self.each_strip(frames, |area, mean, dark, _| {
@@ -83,14 +83,14 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
         if mean > u64::from(white) / 4 {
             return Err(Refusal::BadCalibration(text("the dark picture is bright: cap the lens")));
         }
-        self.dark_map = true;
+        self.calibration.dark_map = true;
         Ok(())
     }
 
     fn make_flat(&mut self, frames: u8) -> Result<(), Refusal> {
-        self.flat_map = false;
+        self.calibration.flat_map = false;
         let (black, white) = (self.setup.sensor.black_level_dn, self.setup.sensor.white_level_dn);
-        let with_map = self.dark_map;
+        let with_map = self.calibration.dark_map;
         let dark_at = |dark: &[u16], i: usize| if with_map { dark.get(i).copied().unwrap_or(black) } else { black };
         // Each colour of a Bayer cell has its own mean: the flat evens the lens, not the filter.
         let mut sums = [0_u64; 4];
@@ -128,7 +128,7 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
                 *to = gain.map_or(GainQ15::ONE.0, |gain| u16::try_from(gain).unwrap_or(u16::MAX));
             }
         })?;
-        self.flat_map = true;
+        self.calibration.flat_map = true;
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! A capture, step by step: one wheel move and exposure, or one strip, at a time.
 
 use super::{Device, Step};
-use crate::compute::{Area, Recipe, compute_strip, planes, preview_step, total_bytes};
+use crate::compute::{Area, Contents, Recipe, compute_strip, planes, preview_step, total_bytes};
 use crate::exposure::{ExposureSearch, Histogram, Level};
 use crate::hardware::{CaptureStore, FrameSource, Micros, Wheel, WheelAxis, text};
 use crate::sequence::{Action, Sequence};
@@ -9,8 +9,7 @@ use heapless::Vec;
 use protocol_polar::fixed::{FixedError, Noise, SensorRange, StokesPlan};
 use protocol_polar::{Analyzer, Degrees, MAX_FRAMES, SolveError, distinct_axes};
 use protocol_wire::{
-    Calibration, CaptureDescription, CaptureId, CaptureRequest, CaptureState, Exposure, FrameInfo, FrameRequest,
-    Progress, Refusal,
+    CaptureDescription, CaptureId, CaptureRequest, CaptureState, Exposure, FrameInfo, FrameRequest, Progress, Refusal,
 };
 
 /// Two axes closer than this are one to a wheel with a hobby servo.
@@ -67,7 +66,7 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
         self.plan(&asked, &request)?;
         let sensor = &self.setup.sensor;
         let rows = self.setup.strip_rows;
-        let planes = planes(sensor, rows, request.word.into(), request.frames.len(), request.keep_raw);
+        let planes = planes(sensor, rows, self.contents(&request));
         let frames = u8::try_from(request.frames.len()).unwrap_or(0);
         let strips = planes.first().map_or(0, |plane| plane.strips);
         let course = match request.exposure {
@@ -83,6 +82,15 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
         self.next_id = CaptureId(id.0.wrapping_add(1));
         self.memory.weights.clear();
         Ok(CaptureJob { id, sequence, request, course, frames: Vec::new(), plan: None })
+    }
+
+    fn contents(&self, request: &CaptureRequest) -> Contents {
+        Contents {
+            word: request.word.into(),
+            frames: request.frames.len(),
+            keep_raw: request.keep_raw,
+            calibration: self.calibration,
+        }
     }
 
     /// The recipe for these frames, or why they are no use.
@@ -137,8 +145,7 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
                     plan,
                     keep_raw: job.request.keep_raw,
                     black_level: self.setup.sensor.black_level_dn,
-                    dark_map: self.dark_map,
-                    flat_map: self.flat_map,
+                    calibration: self.calibration,
                     preview_step: preview_step(&self.setup.sensor),
                 };
                 let area = Area::new(&self.setup.sensor, self.setup.strip_rows, strip);
@@ -216,8 +223,8 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
             frac_bits: plan.format().frac_bits,
             bound_dn,
             misfit_sigma: self.setup.misfit_sigma,
-            calibration: Calibration { dark_map: self.dark_map, flat_map: self.flat_map },
-            planes: planes(sensor, self.setup.strip_rows, word.into(), job.frames.len(), job.request.keep_raw),
+            calibration: self.calibration,
+            planes: planes(sensor, self.setup.strip_rows, self.contents(&job.request)),
         })
     }
 }

@@ -12,7 +12,7 @@ use capture::CaptureJob;
 use heapless::{String, Vec};
 use protocol_polar::MAX_FRAMES;
 use protocol_wire::{
-    CaptureId, Done, FrameRequest, FromDevice, Log, LogLevel, Refusal, Refused, SensorInfo, State, Word,
+    Calibration, CaptureId, Done, FrameRequest, FromDevice, Log, LogLevel, Refusal, Refused, SensorInfo, State, Word,
 };
 use session::Session;
 
@@ -79,8 +79,7 @@ pub struct Device<'a, W, C, S> {
     work: Work,
     next_id: CaptureId,
     last_exposure_us: u32,
-    dark_map: bool,
-    flat_map: bool,
+    calibration: Calibration,
 }
 
 #[derive(Debug)]
@@ -117,8 +116,7 @@ impl<'a, W: Wheel, C: FrameSource, S: CaptureStore> Device<'a, W, C, S> {
             work: Work::Idle,
             next_id: setup.first_capture,
             last_exposure_us: (longest / 16).max(shortest),
-            dark_map: false,
-            flat_map: false,
+            calibration: Calibration { dark_map: false, flat_map: false },
             setup,
             wheel,
             camera,
@@ -152,7 +150,8 @@ impl<'a, W: Wheel, C: FrameSource, S: CaptureStore> Device<'a, W, C, S> {
     pub fn state(&self) -> State {
         match &self.work {
             Work::Capture(job) => State::Capturing(job.id()),
-            Work::Calibration(_) | Work::Idle => match self.session.fetching() {
+            Work::Calibration(_) => State::Calibrating,
+            Work::Idle => match self.session.fetching() {
                 Some(id) => State::Sending(id),
                 None => State::Idle,
             },

@@ -10,6 +10,8 @@ use protocol_wire::{
 
 /// Largest command a host can send, header included.
 const INCOMING_BYTES: usize = 2048;
+/// Silence after which a half-read command is given up: its rest will not come.
+const SILENCE_US: u64 = 500_000;
 /// Answers that may wait for the link.
 const WAITING: usize = 8;
 
@@ -24,6 +26,7 @@ pub(super) struct Session {
     fetch: Option<Sending>,
     /// What of the outgoing frame has not been sent: begin and end.
     unsent: (usize, usize),
+    last_received: Micros,
 }
 
 /// Strips being sent.
@@ -45,6 +48,7 @@ impl Session {
             answers: Deque::new(),
             fetch: None,
             unsent: (0, 0),
+            last_received: Micros(0),
         }
     }
 
@@ -82,17 +86,20 @@ impl Session {
 
 impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
     pub(super) fn serve(&mut self, now: Micros, link: &mut impl ByteLink) -> Activity {
-        let received = match link.read(self.session.incoming.space()) {
-            Ok(bytes) => bytes,
-            Err(_) => {
-                self.session.close();
-                return Activity::Idle;
-            }
+        let room = self.session.incoming.space();
+        // An empty read would look like a closed link to some.
+        let received = if room.is_empty() { Ok(0) } else { link.read(room) };
+        let Ok(received) = received else {
+            self.session.close();
+            return Activity::Idle;
         };
         self.session.incoming.commit(received);
+        if received > 0 {
+            self.session.last_received = now;
+        }
         // A host that asks faster than it reads waits here: commands stay in the buffer while answers are queued.
         while self.session.answers.len() < WAITING / 2 {
-            let Some((header, command)) = self.next_command() else { break };
+            let Some((header, command)) = self.next_command(now) else { break };
             self.obey(now, header, command);
         }
         match self.send(link) {
@@ -106,9 +113,16 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
     }
 
     /// The next whole frame, read as a command.
-    fn next_command(&mut self) -> Option<(Header, Result<FromHost, Refusal>)> {
+    fn next_command(&mut self, now: Micros) -> Option<(Header, Result<FromHost, Refusal>)> {
         loop {
-            return match self.session.incoming.next_event()? {
+            let Some(event) = self.session.incoming.next_event() else {
+                let silent = now.0.saturating_sub(self.session.last_received.0) > SILENCE_US;
+                if silent && self.session.incoming.give_up() {
+                    continue;
+                }
+                return None;
+            };
+            return match event {
                 Event::Frame(header, payload) => {
                     let command = match FromHost::decode(header.key, payload) {
                         Ok(Some(command)) => Ok(command),

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 /// Most captures a camera lists at once.
 pub const MAX_CAPTURES: usize = 16;
-/// Most planes of one capture: three Stokes, flags, residual, two previews, and the raw frames.
-pub const MAX_PLANES: usize = 7 + MAX_FRAMES;
+/// Most planes of one capture: three Stokes, flags, residual, two previews, two maps, and the raw frames.
+pub const MAX_PLANES: usize = 9 + MAX_FRAMES;
 
 /// Names a capture for as long as the camera holds it; never reused within a boot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, Schema)]
@@ -143,6 +143,10 @@ pub enum PlaneKind {
     PreviewAolp,
     /// Raw samples of frame slot n, u16.
     Raw(u8),
+    /// The dark map that was subtracted, u16; kept with the raw frames.
+    DarkMap,
+    /// The flat gains that were applied, u16 Q1.15; kept with the raw frames.
+    FlatMap,
 }
 
 /// A plane the camera can send: row-major, little-endian, cut in strips of whole rows.

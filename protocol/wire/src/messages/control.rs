@@ -47,6 +47,8 @@ pub enum State {
     Capturing(CaptureId),
     /// Sending strips of this capture.
     Sending(CaptureId),
+    /// Taking a dark map or a flat field.
+    Calibrating,
 }
 
 /// The camera's state.
