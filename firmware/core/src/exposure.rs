@@ -2,7 +2,7 @@
 
 /// How bright a picture came out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Level {
+pub(crate) struct Level {
     /// Level below which all but one photosite in 10 000 lie (hot ones do not count), DN.
     pub peak_dn: u16,
     /// Photosites at or above the white level, in 10 000.
@@ -11,7 +11,7 @@ pub struct Level {
 
 /// What to do after all angles were metered at one exposure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub(crate) enum Verdict {
     /// Meter again at this exposure, µs.
     Again(u32),
     /// Use this exposure, µs.
@@ -33,7 +33,7 @@ const MAX_ROUNDS: u8 = 12;
 
 /// The search over exposures.
 #[derive(Clone, Copy, Debug)]
-pub struct ExposureSearch {
+pub(crate) struct ExposureSearch {
     exposure_us: u32,
     limits_us: (u32, u32),
     range_dn: (u16, u16),
@@ -44,25 +44,25 @@ pub struct ExposureSearch {
 impl ExposureSearch {
     /// Starts at `first_us`; `limits_us` are the camera's, `range_dn` black and white level.
     #[must_use]
-    pub fn new(first_us: u32, limits_us: (u32, u32), range_dn: (u16, u16)) -> Self {
+    pub(crate) fn new(first_us: u32, limits_us: (u32, u32), range_dn: (u16, u16)) -> Self {
         let exposure_us = first_us.max(limits_us.0).min(limits_us.1);
         Self { exposure_us, limits_us, range_dn, worst: Level { peak_dn: 0, clipped: 0 }, round: 0 }
     }
 
     /// The exposure to meter at, µs.
     #[must_use]
-    pub fn exposure_us(&self) -> u32 {
+    pub(crate) fn exposure_us(&self) -> u32 {
         self.exposure_us
     }
 
     /// Takes the level of one angle.
-    pub fn observe(&mut self, level: Level) {
+    pub(crate) fn observe(&mut self, level: Level) {
         self.worst.peak_dn = self.worst.peak_dn.max(level.peak_dn);
         self.worst.clipped = self.worst.clipped.max(level.clipped);
     }
 
     /// Decides after the last angle; on `Again` the search continues at the new exposure.
-    pub fn decide(&mut self) -> Verdict {
+    pub(crate) fn decide(&mut self) -> Verdict {
         let (shortest, longest) = self.limits_us;
         let (black, white) = self.range_dn;
         let level = core::mem::replace(&mut self.worst, Level { peak_dn: 0, clipped: 0 });
@@ -94,7 +94,7 @@ impl ExposureSearch {
 
 /// Counts samples by brightness, 256 bins over the bit depth.
 #[derive(Clone, Debug)]
-pub struct Histogram {
+pub(crate) struct Histogram {
     bins: [u32; 256],
     clipped: u32,
     total: u32,
@@ -105,12 +105,12 @@ pub struct Histogram {
 impl Histogram {
     /// An empty histogram for samples of `bit_depth` bits.
     #[must_use]
-    pub fn new(bit_depth: u8, white: u16) -> Self {
+    pub(crate) fn new(bit_depth: u8, white: u16) -> Self {
         Self { bins: [0; 256], clipped: 0, total: 0, shift: bit_depth.saturating_sub(8), white }
     }
 
     /// Counts `samples`.
-    pub fn add(&mut self, samples: &[u16]) {
+    pub(crate) fn add(&mut self, samples: &[u16]) {
         for x in samples {
             let bin = usize::from((*x).min(self.white) >> self.shift);
             if let Some(count) = self.bins.get_mut(bin) {
@@ -123,7 +123,7 @@ impl Histogram {
 
     /// The level of all that was counted.
     #[must_use]
-    pub fn level(&self) -> Level {
+    pub(crate) fn level(&self) -> Level {
         let mut above = 0;
         let mut peak_dn = 0;
         for (bin, count) in (0_u16..256).zip(self.bins).rev() {

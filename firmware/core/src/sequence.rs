@@ -5,7 +5,7 @@ use protocol_wire::{Progress, Stage};
 
 /// What to do next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Action {
+pub(crate) enum Action {
     /// Turn to the axis of frame `frame`, expose, and report the level.
     Meter {
         /// Frame number.
@@ -42,7 +42,7 @@ enum Phase {
 
 /// One capture's course.
 #[derive(Clone, Copy, Debug)]
-pub struct Sequence {
+pub(crate) struct Sequence {
     frames: u8,
     strips: u16,
     clips: bool,
@@ -52,19 +52,19 @@ pub struct Sequence {
 impl Sequence {
     /// A capture of `frames` frames and `strips` strips that finds its exposure first.
     #[must_use]
-    pub fn metered(frames: u8, strips: u16, search: ExposureSearch) -> Self {
+    pub(crate) fn metered(frames: u8, strips: u16, search: ExposureSearch) -> Self {
         Self { frames, strips, clips: false, phase: Phase::Metering { search, frame: 0 } }
     }
 
     /// A capture at a given exposure, µs.
     #[must_use]
-    pub fn fixed(frames: u8, strips: u16, reference_us: u32) -> Self {
+    pub(crate) fn fixed(frames: u8, strips: u16, reference_us: u32) -> Self {
         Self { frames, strips, clips: false, phase: Phase::Taking { reference_us, frame: 0 } }
     }
 
     /// The next thing to do; the same until it is reported done.
     #[must_use]
-    pub fn next(&self) -> Action {
+    pub(crate) fn next(&self) -> Action {
         match self.phase {
             Phase::Metering { search, frame } => Action::Meter { frame, reference_us: search.exposure_us() },
             Phase::Taking { reference_us, frame } => Action::Take { frame, reference_us },
@@ -75,7 +75,7 @@ impl Sequence {
     }
 
     /// The metering picture was taken and is this bright.
-    pub fn metered_at(&mut self, level: Level) {
+    pub(crate) fn metered_at(&mut self, level: Level) {
         let Phase::Metering { search, frame } = &mut self.phase else { return };
         search.observe(level);
         *frame += 1;
@@ -94,7 +94,7 @@ impl Sequence {
     }
 
     /// The frame is in its slot.
-    pub fn taken(&mut self) {
+    pub(crate) fn taken(&mut self) {
         let Phase::Taking { frame, .. } = &mut self.phase else { return };
         *frame += 1;
         if *frame == self.frames {
@@ -103,7 +103,7 @@ impl Sequence {
     }
 
     /// The strip is stored.
-    pub fn computed(&mut self) {
+    pub(crate) fn computed(&mut self) {
         let Phase::Computing { strip } = &mut self.phase else { return };
         *strip += 1;
         if *strip == self.strips {
@@ -113,13 +113,13 @@ impl Sequence {
 
     /// Whether something clips at the locked exposure.
     #[must_use]
-    pub fn clips(&self) -> bool {
+    pub(crate) fn clips(&self) -> bool {
         self.clips
     }
 
     /// How far it is.
     #[must_use]
-    pub fn progress(&self) -> Progress {
+    pub(crate) fn progress(&self) -> Progress {
         let (stage, done, total) = match self.phase {
             Phase::Metering { frame, .. } => (Stage::Metering, frame.into(), self.frames.into()),
             Phase::Taking { frame, .. } => (Stage::Exposing, frame.into(), self.frames.into()),

@@ -3,9 +3,11 @@
     clippy::cast_possible_truncation,
     clippy::cast_possible_wrap,
     clippy::cast_sign_loss,
+    clippy::unwrap_used,
     reason = "tests choose numbers that fit"
 )]
 
+use firmware_core::kernel::polar_form::{polar_form, polar_form_strip};
 use firmware_core::kernel::{Dark, StripError, StripInput, StripOutput, WeightTable, stokes_i16, stokes_i32};
 use proptest::prelude::*;
 use protocol_polar::fixed::{GainQ15, Noise, Photosite, SensorRange, StokesPlan, Word};
@@ -104,6 +106,23 @@ proptest! {
     fn kernel_is_the_definition(case in cases()) {
         for (i, got) in case.kernel().into_iter().enumerate() {
             prop_assert_eq!(got, case.definition(i), "photosite {} {:?}", i, case.frames.iter().map(|f| f[i]).collect::<Vec<_>>());
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn polar_form_of_a_strip_is_that_of_its_photosites(
+        stokes in prop::collection::vec(any::<[i16; 3]>(), 0..200),
+        small in prop::collection::vec([-3..4_i16, -3..4_i16, -3..4_i16], 0..200),
+    ) {
+        let stokes: Vec<[i16; 3]> = stokes.into_iter().chain(small).collect();
+        let planes = [0, 1, 2].map(|j| stokes.iter().map(|s| s[j]).collect::<Vec<_>>());
+        let (mut dolp, mut aolp) = (vec![1; stokes.len()], vec![1; stokes.len()]);
+        polar_form_strip(planes.each_ref().map(Vec::as_slice), &mut dolp, &mut aolp);
+        for (i, s) in stokes.iter().enumerate() {
+            let want = polar_form(s.map(i32::from));
+            prop_assert_eq!((dolp[i], aolp[i]), (want.dolp_q16, want.aolp_turn16), "{:?}", s);
         }
     }
 }

@@ -190,14 +190,14 @@ impl<'a, W: Wheel, C: FrameSource, S: CaptureStore> Device<'a, W, C, S> {
         };
         match result {
             Ok(Step::More) => self.session.report(sequence, before),
-            Ok(Step::Done(id)) => self.session.answer(sequence, FromDevice::Done(Done { id })),
-            Err(refusal) => self.session.answer(sequence, FromDevice::Refused(Refused { refusal })),
+            Ok(Step::Done(id)) => self.session.tell(sequence, FromDevice::Done(Done { id })),
+            Err(refusal) => self.session.tell(sequence, FromDevice::Refused(Refused { refusal })),
         }
         Activity::Busy
     }
 
     fn warn(&mut self, sequence: u16, what: &str) {
-        self.session.answer(sequence, FromDevice::Log(Log { level: LogLevel::Warning, text: text(what) }));
+        self.session.tell(sequence, FromDevice::Log(Log { level: LogLevel::Warning, text: text(what) }));
     }
 }
 

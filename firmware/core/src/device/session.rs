@@ -26,6 +26,8 @@ pub(super) struct Session {
     fetch: Option<Sending>,
     /// What of the outgoing frame has not been sent: begin and end.
     unsent: (usize, usize),
+    /// The session that started the running work: only it gets news of it, under a number of its own.
+    at_work_for: u32,
     last_received: Micros,
 }
 
@@ -48,6 +50,7 @@ impl Session {
             answers: Deque::new(),
             fetch: None,
             unsent: (0, 0),
+            at_work_for: 0,
             last_received: Micros(0),
         }
     }
@@ -63,10 +66,18 @@ impl Session {
         self.answers.push_back((sequence, message)).ok(); // there is room now
     }
 
+    /// Queues news of the running work for the session that started it. In any other the sequence number means something
+    /// else, or nothing.
+    pub(super) fn tell(&mut self, sequence: u16, news: FromDevice) {
+        if self.id == self.at_work_for {
+            self.answer(sequence, news);
+        }
+    }
+
     /// Queues a progress report if the host keeps up.
     pub(super) fn report(&mut self, sequence: u16, progress: Progress) {
         if self.answers.len() < WAITING / 2 {
-            self.answer(sequence, FromDevice::Progress(progress));
+            self.tell(sequence, FromDevice::Progress(progress));
         }
     }
 
@@ -184,6 +195,7 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
                 let job = self.start_capture(sequence, start.request)?;
                 let id = job.id();
                 self.work = Work::Capture(job);
+                self.session.at_work_for = self.session.id;
                 Some(FromDevice::Accepted(Accepted { id }))
             }
             FromHost::Cancel(_) => {
@@ -191,11 +203,11 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
                     Work::Capture(job) => {
                         self.store.remove(job.id()).ok(); // it may not have been written yet
                         let refused = Refused { refusal: Refusal::Cancelled };
-                        self.session.answer(job.sequence(), FromDevice::Refused(refused));
+                        self.session.tell(job.sequence(), FromDevice::Refused(refused));
                     }
                     Work::Calibration(job) => {
                         let refused = Refused { refusal: Refusal::Cancelled };
-                        self.session.answer(job.sequence(), FromDevice::Refused(refused));
+                        self.session.tell(job.sequence(), FromDevice::Refused(refused));
                     }
                     Work::Idle => {}
                 }
@@ -206,6 +218,7 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
                 match self.start_calibration(sequence, what)? {
                     Some(job) => {
                         self.work = Work::Calibration(job);
+                        self.session.at_work_for = self.session.id;
                         None
                     }
                     None => Some(FromDevice::Done(protocol_wire::Done { id: None })),

@@ -1,15 +1,22 @@
 //! The strip kernel: N frames in, Stokes integers, residual and flags out; integers only, no allocation.
 //!
 //! [`protocol_polar::fixed::StokesPlan::photosite`] is the definition; what is here computes the same bits fast. The common
-//! photosite (nothing saturated) goes through loops over blocks that the compiler vectorizes; a photosite with a saturated
-//! sample is computed by the definition itself, with weights kept per mask.
+//! photosite (nothing saturated, nothing clamped) goes through vector loops: `x86` holds the 16-bit ones for AVX2 and
+//! AVX-512, `portable` those for any processor, `wide` the 32-bit ones. The others are computed one by one, with weights
+//! kept per mask.
 //!
 //! Bits of the proof that 32-bit accumulators are enough stand in docs/NUMERICS.md.
 
 mod masks;
 mod narrow;
 pub mod polar_form;
+mod portable;
+mod simd;
+#[cfg(test)]
+mod tests;
 mod wide;
+#[cfg(target_arch = "x86_64")]
+mod x86;
 
 pub use masks::WeightTable;
 

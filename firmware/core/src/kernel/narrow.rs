@@ -1,22 +1,29 @@
 //! 16-bit planes, 32-bit accumulators: the fast setting.
 //!
-//! Work goes in blocks of [`BLOCK`] photosites that stay in the first-level cache: each loop below is one pass over a block,
-//! simple enough to be vectorized. What is rare (a saturated sample, a clamped value) is found by block and then recomputed
-//! photosite by photosite with the definition.
-#![expect(clippy::indexing_slicing, reason = "every index runs over a block, whose length is part of its type")]
+//! A strip is cut into spans that stay in the first two caches. A span is computed in whole blocks by one of the twins
+//! (`x86` where the processor has AVX2 or AVX-512, `portable` elsewhere). Each leaves [`RECOMPUTE`] in the flags of what is
+//! rare: a saturated sample, a value at an end of its word, a dark level beyond white. Those are computed one by one in 32
+//! bits, or by the definition where even that might not hold them, as are the few behind the last whole block.
+#![expect(clippy::indexing_slicing, reason = "`check` has compared every length with the strip's before")]
 #![expect(
     clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    clippy::cast_possible_wrap,
     reason = "integer words change width on purpose; each place says why the value fits"
 )]
 
-use super::{Dark, StripError, StripInput, StripOutput, WeightTable, check, gain_at};
-use protocol_polar::fixed::{Row, StokesPlan, Weights, Word};
+use super::{Dark, StripError, StripInput, StripOutput, WeightTable, check, gain_at, simd};
+use protocol_polar::fixed::{GainQ15, Row, StokesPlan, Weights, Word};
 use protocol_polar::{Flags, MAX_FRAMES};
 
-/// Photosites per block: all arrays of one block together take about 4 KiB.
-const BLOCK: usize = 128;
+/// Photosites the twins take at a time.
+pub(super) const BLOCK: usize = 128;
+/// Photosites between two looks for what is rare: with four frames, frames and planes of a span take 35 KB.
+const SPAN: usize = 16 * BLOCK;
+/// Flags looked at together for marks.
+const CHUNK: usize = 32;
+/// Computes whole blocks and says whether any photosite is left to the definition.
+pub(super) type Twin = fn(&Fast, &StripInput, StripOutput<i16, u16>) -> bool;
+/// In a flag byte: the definition must compute this photosite. No flag of the protocol; never left in the output.
+pub(super) const RECOMPUTE: u8 = 1 << 7;
 
 /// Computes one strip with 16-bit planes. Shapes: see [`StripInput`] and [`StripOutput`].
 ///
@@ -28,42 +35,53 @@ pub fn stokes_i16(
     input: StripInput,
     output: StripOutput<i16, u16>,
 ) -> Result<(), StripError> {
+    stokes_i16_by(simd::narrow(), plan, table, input, output)
+}
+
+/// [`stokes_i16`] with the twin given, so that a test can compare them.
+pub(super) fn stokes_i16_by(
+    twin: Twin,
+    plan: &StokesPlan,
+    table: &mut WeightTable,
+    input: StripInput,
+    output: StripOutput<i16, u16>,
+) -> Result<(), StripError> {
     let photosites = check(plan, &input, &output)?;
     if plan.format().word != Word::I16 {
         return Err(StripError::Format);
     }
     // A checked plan has weights for the full set.
-    let Some(weights) = table.weights(plan, 0).cloned() else { return Err(StripError::Format) };
-    let fast = Fast::new(plan, &weights);
-    let [s0, s1, s2] = output.stokes;
-    let mut strip = Strip { plan, table, input, s: [s0, s1, s2], residual: output.residual, flags: output.flags };
-    let mut start = 0;
-    while start + BLOCK <= photosites {
-        strip.block(&fast, start);
-        start += BLOCK;
+    let Some(weights) = table.weights(plan, 0) else { return Err(StripError::Format) };
+    let fast = Fast::new(plan, weights);
+    let mut strip = Strip { plan, table, input, output };
+    let whole = photosites - photosites % BLOCK;
+    for start in (0..whole).step_by(SPAN) {
+        strip.span(twin, &fast, start, whole.min(start + SPAN));
     }
-    for i in start..photosites {
+    for i in whole..photosites {
         strip.by_definition(i);
     }
     Ok(())
 }
 
-/// The weights of the full set, in the kernel's own widths.
-struct Fast {
+/// The weights of the full set, in the twins' own widths.
+pub(super) struct Fast {
     rows: [FastRow; MAX_FRAMES],
     residual_rows: usize,
-    white: u16,
-    misfit_floor: u32,
-    misfit_slope: u32,
+    /// A sample at or above this is saturated.
+    pub(super) white: u16,
+    /// The misfit threshold's constant; at its largest no 15-bit residual exceeds it.
+    pub(super) misfit_floor: i32,
+    /// The misfit threshold's slope over s0, 17 bits, 8 of them fractional.
+    pub(super) misfit_slope: i32,
 }
 
+/// One [`Row`] of the full set.
 #[derive(Clone, Copy)]
-struct FastRow {
-    q: [i16; MAX_FRAMES],
-    half: i32,
-    shift: u32,
-    /// Σ q: a dark level common to all frames comes out as one product.
-    sum: i32,
+pub(super) struct FastRow {
+    pub(super) q: [i16; MAX_FRAMES],
+    pub(super) half: i32,
+    pub(super) shift: u32,
 }
 
 impl FastRow {
@@ -72,24 +90,35 @@ impl FastRow {
             q: row.q.map(|q| q as i16), // 16-bit planes have 16-bit weights, by construction of the row
             half: row.half as i32,      // below the accumulator's limit, by construction of the row
             shift: u32::from(row.shift),
-            sum: row.q.iter().fold(0_i32, |sum, q| sum.wrapping_add(*q)),
         }
     }
 }
 
 impl Fast {
     fn new(plan: &StokesPlan, weights: &Weights) -> Self {
-        let mut rows = [FastRow { q: [0; MAX_FRAMES], half: 0, shift: 1, sum: 0 }; MAX_FRAMES];
+        let mut rows = [FastRow { q: [0; MAX_FRAMES], half: 0, shift: 1 }; MAX_FRAMES];
         for (to, from) in rows.iter_mut().zip(weights.stokes_rows().iter().chain(weights.residual_rows())) {
             *to = FastRow::new(from);
         }
+        let misfit = weights.misfit();
         Self {
             rows,
             residual_rows: weights.residual_rows().len(),
             white: plan.range().white_level,
-            misfit_floor: u32::try_from(weights.misfit().floor).unwrap_or(u32::MAX),
-            misfit_slope: u32::try_from(weights.misfit().slope).unwrap_or(0),
+            misfit_floor: i32::try_from(misfit.floor).unwrap_or(i32::MAX),
+            misfit_slope: i32::try_from(misfit.slope).unwrap_or(0), // 17 bits, by construction
         }
+    }
+
+    /// The rows of s0, s1, s2.
+    pub(super) fn stokes_rows(&self) -> [&FastRow; 3] {
+        let [s0, s1, s2, ..] = &self.rows;
+        [s0, s1, s2]
+    }
+
+    /// The N − 3 residual rows.
+    pub(super) fn residual_rows(&self) -> &[FastRow] {
+        &self.rows[3..3 + self.residual_rows]
     }
 }
 
@@ -97,55 +126,75 @@ struct Strip<'a, 't> {
     plan: &'a StokesPlan,
     table: &'t mut WeightTable,
     input: StripInput<'a>,
-    s: [&'a mut [i16]; 3],
-    residual: &'a mut [u16],
-    flags: &'a mut [u8],
+    output: StripOutput<'a, i16, u16>,
 }
 
-/// One block's frames and darks, and its results.
-struct Block<'a> {
-    frames: [&'a [u16; BLOCK]; MAX_FRAMES],
-    dark: [u16; BLOCK],
-    s: [[i16; BLOCK]; 3],
-    residual: [u16; BLOCK],
-    flags: [u8; BLOCK],
-    /// Something rare is in this block.
-    rare: bool,
-}
-
-impl<'a> Strip<'a, '_> {
-    fn block(&mut self, fast: &Fast, start: usize) {
-        const EMPTY: &[u16; BLOCK] = &[0; BLOCK];
-        let range = start..start + BLOCK;
-        let of = |frame: &'a [u16]| frame[range.clone()].first_chunk().unwrap_or(EMPTY);
-        // Places beyond the last frame hold the first one again: their weight is 0 and the extremes do not change.
-        let mut frames = [of(self.input.frames[0]); MAX_FRAMES];
+impl Strip<'_, '_> {
+    /// Photosites `start..end`, whole blocks.
+    fn span(&mut self, twin: Twin, fast: &Fast, start: usize, end: usize) {
+        let range = start..end;
+        let mut frames = [&[][..]; MAX_FRAMES];
         for (to, from) in frames.iter_mut().zip(self.input.frames) {
-            *to = of(from);
+            *to = &from[range.clone()];
         }
-        let mut dark = [0; BLOCK];
-        match self.input.dark {
-            Dark::Level(level) => dark = [level; BLOCK],
-            Dark::Map(map) => dark.copy_from_slice(&map[range.clone()]),
+        let input = StripInput {
+            frames: &frames[..self.input.frames.len()],
+            dark: match self.input.dark {
+                Dark::Level(level) => Dark::Level(level),
+                Dark::Map(map) => Dark::Map(&map[range.clone()]),
+            },
+            flat: self.input.flat.map(|flat| &flat[range.clone()]),
+        };
+        let output = StripOutput {
+            stokes: self.output.stokes.each_mut().map(|plane| &mut plane[range.clone()]),
+            residual: &mut self.output.residual[range.clone()],
+            flags: &mut self.output.flags[range.clone()],
+        };
+        if !twin(fast, &input, output) {
+            return;
         }
-        let mut block =
-            Block { frames, dark, s: [[0; BLOCK]; 3], residual: [0; BLOCK], flags: [0; BLOCK], rare: false };
-        simd::run(fast, self.input.frames.len(), self.input.flat.map(|flat| &flat[range.clone()]), &mut block);
-        for (plane, values) in self.s.iter_mut().zip(&block.s) {
-            plane[range.clone()].copy_from_slice(values);
+        // Which chunks of flags have a mark, first without a branch: where marks are few, each would be mispredicted.
+        let mut marked = [0_u16; SPAN / CHUNK];
+        let mut count = 0;
+        for (chunk, flags) in (0_u16..).zip(self.output.flags[range].as_chunks::<CHUNK>().0) {
+            marked[count] = chunk;
+            count += usize::from(flags.iter().fold(0, |all, flags| all | flags) & RECOMPUTE != 0);
         }
-        self.residual[range.clone()].copy_from_slice(&block.residual);
-        self.flags[range.clone()].copy_from_slice(&block.flags);
-        if block.rare {
-            for i in range {
-                let saturated = self.input.frames.iter().any(|frame| frame[i] >= fast.white);
-                let clamped = self.s.iter().any(|plane| plane[i] == i16::MIN || plane[i] == i16::MAX);
-                // With a flat, a value may have been clamped before the gain and lie anywhere after it.
-                if saturated || clamped || self.input.flat.is_some() {
-                    self.by_definition(i);
-                }
+        for chunk in &marked[..count] {
+            let at = start + CHUNK * usize::from(*chunk);
+            let mut marks = self.output.flags[at..].first_chunk().map_or(0, marks_in);
+            while marks != 0 {
+                self.rare(at + marks.trailing_zeros() as usize);
+                marks &= marks - 1;
             }
         }
+    }
+
+    /// A photosite the twin left: in 32 bits like the twin where only samples are saturated, else by the definition.
+    fn rare(&mut self, i: usize) {
+        let white = self.plan.range().white_level;
+        let dark = self.input.dark.at(i);
+        let mut differences = [0_i32; MAX_FRAMES];
+        let (mut dropped, mut signs) = (0_u16, 0);
+        for ((k, difference), frame) in (0..).zip(&mut differences).zip(self.input.frames) {
+            let saturated = frame[i] >= white;
+            dropped |= u16::from(saturated) << k;
+            // A dropped frame's weight is 0.
+            *difference = if saturated { 0 } else { i32::from(frame[i]) - i32::from(dark) };
+            signs |= *difference;
+        }
+        let computed =
+            self.table.weights(self.plan, dropped).filter(|_| dark < white).and_then(|weights| {
+                photosite(weights, &differences, self.input.frames.len(), gain_at(self.input.flat, i))
+            });
+        let Some((stokes, residual, misfit)) = computed else { return self.by_definition(i) };
+        for (plane, value) in self.output.stokes.iter_mut().zip(stokes) {
+            plane[i] = value;
+        }
+        self.output.residual[i] = residual;
+        let flag = |raised: bool, flag: Flags| u8::from(raised) * flag.0;
+        self.output.flags[i] =
+            flag(dropped != 0, Flags::SATURATED) | flag(signs < 0, Flags::BELOW_BLACK) | flag(misfit, Flags::MISFIT);
     }
 
     fn by_definition(&mut self, i: usize) {
@@ -156,161 +205,53 @@ impl<'a> Strip<'a, '_> {
         }
         let weights = self.table.weights(self.plan, self.plan.saturated(samples));
         let photosite = self.plan.photosite(weights, samples, self.input.dark.at(i), gain_at(self.input.flat, i));
-        for (plane, value) in self.s.iter_mut().zip(photosite.stokes) {
+        for (plane, value) in self.output.stokes.iter_mut().zip(photosite.stokes) {
             plane[i] = value as i16; // clamped to the format's limits
         }
-        self.residual[i] = photosite.residual as u16; // clamped to the format's limit
-        self.flags[i] = photosite.flags.0;
+        self.output.residual[i] = photosite.residual as u16; // clamped to the format's limit
+        self.output.flags[i] = photosite.flags.0;
     }
 }
 
-/// The passes over one block, for a number of frames known when compiled.
-///
-/// `inline(always)`: compiled once for each instruction set that calls it.
-#[inline(always)]
-fn passes<const N: usize>(fast: &Fast, flat: Option<&[u16]>, block: &mut Block) {
-    let frames: [&[u16; BLOCK]; N] = core::array::from_fn(|k| block.frames[k]);
-    let dark = &block.dark;
-
-    let mut brightest = 0;
-    for i in 0..BLOCK {
-        let mut low = frames[0][i];
-        let mut high = low;
-        for frame in &frames[1..] {
-            low = low.min(frame[i]);
-            high = high.max(frame[i]);
-        }
-        brightest = brightest.max(high);
-        block.flags[i] = u8::from(low < dark[i]) * Flags::BELOW_BLACK.0;
-    }
-    let mut rare = brightest >= fast.white;
-
-    for (row, out) in fast.rows.iter().zip(&mut block.s) {
-        let (mut least, mut most) = (i32::MAX, i32::MIN);
-        for i in 0..BLOCK {
-            let value = component(row, &frames, dark, i);
-            least = least.min(value);
-            most = most.max(value);
-            out[i] = clamp_i16(value);
-        }
-        rare |= least < i32::from(i16::MIN) || most > i32::from(i16::MAX);
-    }
-
-    if let [row] = &fast.rows[3..3 + fast.residual_rows] {
-        for i in 0..BLOCK {
-            block.residual[i] = component(row, &frames, dark, i).unsigned_abs().min(65535) as u16;
-        }
-    } else if fast.residual_rows > 1 {
-        let mut sum = [0_u32; BLOCK];
-        for row in &fast.rows[3..3 + fast.residual_rows] {
-            for i in 0..BLOCK {
-                // Beyond 65535 the root saturates whatever the rest is, and so does this.
-                let r = component(row, &frames, dark, i).unsigned_abs().min(65535);
-                sum[i] = sum[i].saturating_add(r * r);
-            }
-        }
-        for i in 0..BLOCK {
-            block.residual[i] = isqrt(sum[i]);
-        }
-    }
-    if fast.residual_rows > 0 {
-        for i in 0..BLOCK {
-            let r = u32::from(block.residual[i]);
-            // 15 bits of s0 times 17 bits of slope, and a floor of 31 bits: the sum fits.
-            let s0 = u32::from(block.s[0][i].max(0) as u16);
-            let allowed = fast.misfit_floor.wrapping_add((s0 * fast.misfit_slope) >> 8);
-            block.flags[i] |= u8::from(r * r > allowed) * Flags::MISFIT.0;
-        }
-    }
-
-    if let Some(gain) = flat.and_then(|flat| flat.first_chunk::<BLOCK>()) {
-        for out in &mut block.s {
-            let mut clamped = 0;
-            for i in 0..BLOCK {
-                // i16 times u16 and the rounding constant stay inside i32.
-                let scaled = (i32::from(out[i]) * i32::from(gain[i]) + (1 << 14)) >> 15;
-                out[i] = clamp_i16(scaled);
-                clamped |= scaled ^ i32::from(out[i]);
-            }
-            rare |= clamped != 0;
-        }
-        for i in 0..BLOCK {
-            let scaled = (u32::from(block.residual[i]) * u32::from(gain[i]) + (1 << 14)) >> 15;
-            block.residual[i] = scaled.min(65535) as u16;
-        }
-    }
-    block.rare = rare;
+/// Bit i is set where byte i is marked.
+fn marks_in(flags: &[u8; CHUNK]) -> u32 {
+    flags.as_chunks().0.iter().rev().fold(0, |marks, eight| {
+        let tops = u64::from_le_bytes(*eight) & u64::from_le_bytes([RECOMPUTE; 8]);
+        // Brings the top bit of byte i to bit 56 + i; no two products meet.
+        marks << 8 | (tops.wrapping_mul(0x0002_0408_1020_4081) >> 56) as u32
+    })
 }
 
-/// (Σ q_k x_k − dark Σ q_k + ½) >> shift. Partial sums may wrap; the whole does not, and wrapping is exact modulo 2³².
-#[inline(always)]
-fn component<const N: usize>(row: &FastRow, frames: &[&[u16; BLOCK]; N], dark: &[u16; BLOCK], i: usize) -> i32 {
-    let mut sum = row.half.wrapping_sub(row.sum.wrapping_mul(i32::from(dark[i])));
-    for k in 0..N {
-        // A sample of 16 bits turns negative here; it is beyond white, and its photosite is computed again.
-        sum = sum.wrapping_add(i32::from(row.q[k]) * i32::from(frames[k][i] as i16));
-    }
-    sum >> row.shift
-}
-
-#[inline(always)]
-fn clamp_i16(value: i32) -> i16 {
-    value.clamp(i32::from(i16::MIN), i32::from(i16::MAX)) as i16
-}
-
-/// Largest integer whose square is at most `x`, digit by digit without branches, so that it vectorizes.
-#[inline(always)]
-fn isqrt(x: u32) -> u16 {
-    let (mut rest, mut root) = (x, 0_u32);
-    for step in (0..16).rev() {
-        let bit = 1_u32 << (2 * step);
-        let trial = root + bit;
-        let fits = rest >= trial;
-        rest -= if fits { trial } else { 0 };
-        root = (root >> 1) + if fits { bit } else { 0 };
-    }
-    root as u16 // below 2¹⁶
-}
-
-/// Picks the widest vectors this processor has. The result is the same bits everywhere.
-mod simd {
-    use super::{Block, Fast, passes};
-
-    #[cfg(target_arch = "x86_64")]
-    cpufeatures::new!(has_avx2, "avx2");
-
-    pub(super) fn run(fast: &Fast, frames: usize, flat: Option<&[u16]>, block: &mut Block) {
-        #[cfg(target_arch = "x86_64")]
-        if has_avx2::get() {
-            // SAFETY: the processor has just said that it has AVX2, the only thing the function asks for.
-            #[expect(
-                unsafe_code,
-                reason = "calling a function compiled for more than the baseline; 3x faster on x86-64"
-            )]
-            unsafe {
-                run_avx2(fast, frames, flat, block);
-            }
-            return;
+/// Stokes, residual and misfit of one photosite, or nothing where a value reaches an end of its word. Differences of a used
+/// frame are those of admissible samples, so that 32 bits are enough.
+fn photosite(
+    weights: &Weights,
+    differences: &[i32; MAX_FRAMES],
+    frames: usize,
+    gain: GainQ15,
+) -> Option<([i16; 3], u16, bool)> {
+    let component = |row: &Row| {
+        let products = row.q.iter().zip(differences).take(frames).map(|(q, x)| q.wrapping_mul(*x));
+        products.fold(row.half as i32, i32::wrapping_add) >> row.shift
+    };
+    let inside = |s: i32| s.unsigned_abs() < i16::MAX.unsigned_abs().into();
+    let gain = i32::from(gain.0);
+    let [s0, s1, s2] = weights.stokes_rows().each_ref().map(component);
+    let scaled = [s0, s1, s2].map(|s| (s.wrapping_mul(gain).wrapping_add(1 << 14)) >> 15);
+    let mut fits = inside(s0) & inside(s1) & inside(s2) & scaled.iter().all(|s| inside(*s));
+    let r = match weights.residual_rows() {
+        [] => 0,
+        [row] => component(row).unsigned_abs(),
+        rows => {
+            let squares = rows.iter().map(|row| u64::from(component(row).unsigned_abs())).map(|r| r * r);
+            squares.sum::<u64>().isqrt().min(u32::MAX.into()) as u32
         }
-        by_count(fast, frames, flat, block);
+    };
+    fits &= r < 1 << 15;
+    if !fits {
+        return None;
     }
-
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn run_avx2(fast: &Fast, frames: usize, flat: Option<&[u16]>, block: &mut Block) {
-        by_count(fast, frames, flat, block);
-    }
-
-    #[inline(always)]
-    fn by_count(fast: &Fast, frames: usize, flat: Option<&[u16]>, block: &mut Block) {
-        match frames {
-            3 => passes::<3>(fast, flat, block),
-            4 => passes::<4>(fast, flat, block),
-            5 => passes::<5>(fast, flat, block),
-            6 => passes::<6>(fast, flat, block),
-            7 | 8 => passes::<8>(fast, flat, block),
-            9..=12 => passes::<12>(fast, flat, block),
-            _ => passes::<16>(fast, flat, block),
-        }
-    }
+    let allowed = weights.misfit().floor + ((u64::from(s0.max(0).unsigned_abs()) * weights.misfit().slope) >> 8);
+    let residual = (r * gain.unsigned_abs() + (1 << 14)) >> 15;
+    Some((scaled.map(|s| s as i16), residual as u16, u64::from(r * r) > allowed))
 }

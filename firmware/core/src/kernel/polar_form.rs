@@ -3,6 +3,8 @@
 //! Volder 1959, "The CORDIC trigonometric computing technique", vectoring mode. The AoLP is half the angle of (s1, s2), so
 //! its 16-bit turn covers 180°.
 
+use super::simd;
+
 /// Degree and angle of linear polarization of one photosite or block.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PolarForm {
@@ -33,58 +35,74 @@ const ANGLES: [i32; 17] = [
     10_430,
 ];
 /// Π cos(atan 2^−i) in Q31: undoes the growth of the magnitude.
-const SHRINK_Q31: i64 = 1_304_065_748;
+const SHRINK_Q31: u64 = 1_304_065_748;
 /// Bits below the input's last place: inputs are below 2^16, and √2 · 2^16 · 1.647 · 2^13 stays below 2^31.
 const GUARD_BITS: u32 = 13;
 
 /// DoLP and AoLP of `[s0, s1, s2]`, each in [−65535, 65535], in any common unit.
 ///
-/// Against exact arithmetic, wherever √(s1² + s2²) >= 64: AoLP within 1.5 units (0.004°), DoLP within 2 units + 2/s0
-/// (searched by a test; derivation in docs/NUMERICS.md).
+/// Against exact arithmetic, with r = √(s1² + s2²) in units of the input: AoLP within 0.66 + 36.5/r units, DoLP within
+/// 1 + 128/s0 units (derived in docs/NUMERICS.md, searched by a test).
 #[must_use]
+pub fn polar_form(stokes: [i32; 3]) -> PolarForm {
+    vectoring(stokes.map(|s| s.clamp(-65535, 65535)))
+}
+
+/// [`polar_form`] of each photosite of 16-bit planes, vectorized: same bits. `dolp` and `aolp` get
+/// [`PolarForm::dolp_q16`] and [`PolarForm::aolp_turn16`].
+///
+/// All five slices have one value per photosite, row-major; if one is shorter, the rest of the others is left alone.
+pub fn polar_form_strip([s0, s1, s2]: [&[i16]; 3], dolp: &mut [u16], aolp: &mut [u16]) {
+    simd::widest(
+        #[inline(always)]
+        || {
+            let planes = s0.iter().zip(s1).zip(s2).zip(dolp).zip(aolp);
+            for ((((s0, s1), s2), dolp), aolp) in planes {
+                let form = vectoring([(*s0).into(), (*s1).into(), (*s2).into()]);
+                (*dolp, *aolp) = (form.dolp_q16, form.aolp_turn16);
+            }
+        },
+    );
+}
+
+/// The rotation and the ratio, of numbers in [−65535, 65535]. Choices instead of branches and loops of fixed length: the
+/// compiler makes one vector loop of the whole.
+#[inline(always)]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "each value is bounded just before")]
-pub fn polar_form([s0, s1, s2]: [i32; 3]) -> PolarForm {
-    if s1 == 0 && s2 == 0 {
-        return PolarForm::default();
-    }
-    let clamp = |s: i32| s.clamp(-65535, 65535) << GUARD_BITS;
-    let (mut x, mut y) = (clamp(s1), clamp(s2));
-    let mut turn = 0_i32;
-    if x < 0 {
-        (x, y, turn) = (-x, -y, i32::MIN); // half a turn
-    }
+fn vectoring([s0, s1, s2]: [i32; 3]) -> PolarForm {
+    let behind = s1 < 0;
+    let mut x = s1.abs() << GUARD_BITS;
+    let mut y = (if behind { -s2 } else { s2 }) << GUARD_BITS;
+    let mut turn = if behind { i32::MIN } else { 0 }; // half a turn
     for (i, angle) in (0_u32..).zip(ANGLES) {
         let (dx, dy) = (y >> i, x >> i);
-        if y >= 0 {
-            (x, y, turn) = (x + dx, y - dy, turn.wrapping_add(angle));
-        } else {
-            (x, y, turn) = (x - dx, y + dy, turn.wrapping_sub(angle));
-        }
+        let up = y >= 0;
+        x = if up { x + dx } else { x - dx };
+        y = if up { y - dy } else { y + dy };
+        turn = turn.wrapping_add(if up { angle } else { -angle });
     }
     // Round to the nearest 2^−16 turn; the top wraps to 0, as an axis does.
     let aolp_turn16 = (turn.wrapping_add(1 << 15) >> 16) as u16;
-    if s0 <= 0 {
-        return PolarForm { dolp_q16: 0, aolp_turn16 };
+    let magnitude = ((u64::from(x as u32) * SHRINK_Q31) >> 31) as u32;
+    let dolp_q16 = ratio_q16(magnitude, (s0.max(0) << GUARD_BITS) as u32);
+    PolarForm {
+        dolp_q16: if s0 <= 0 || s1 | s2 == 0 { 0 } else { dolp_q16 },
+        aolp_turn16: if s1 | s2 == 0 { 0 } else { aolp_turn16 },
     }
-    let magnitude = ((i64::from(x) * SHRINK_Q31) >> 31) as u32;
-    PolarForm { dolp_q16: ratio_q16(magnitude, (clamp(s0)) as u32), aolp_turn16 }
 }
 
-/// `a / b` in Q0.16 by shift and subtract, 65535 where it is 1 or more. Both below 2^31, b > 0.
+/// `a / b` in Q0.16 by shift and subtract, 65535 where it is 1 or more. Both below 2^31; any number if b is 0.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "sixteen bits were pushed")]
 fn ratio_q16(a: u32, b: u32) -> u16 {
-    if a >= b {
-        return u16::MAX;
-    }
-    let (mut rest, mut quotient) = (a, 0_u16);
+    let (mut rest, mut quotient) = (a, 0_u32);
     for _ in 0..16 {
-        rest <<= 1;
-        quotient <<= 1;
-        if rest >= b {
-            rest -= b;
-            quotient |= 1;
-        }
+        let double = rest << 1;
+        // What is too small to subtract from wraps to the larger number.
+        rest = double.min(double.wrapping_sub(b));
+        quotient = quotient << 1 | u32::from(rest != double);
     }
-    quotient
+    if a >= b { u16::MAX } else { quotient as u16 }
 }
 
 #[cfg(test)]
@@ -105,7 +123,7 @@ mod tests {
     #[test]
     fn stays_within_its_bound_all_around() {
         let (mut worst_angle, mut worst_dolp): (f64, f64) = (0.0, 0.0);
-        for radius in [64.0, 65.5, 100.0, 999.0, 12_345.0, 46_000.0, 65_535.0_f64] {
+        for radius in [3.0, 20.0, 64.0, 65.5, 100.0, 999.0, 12_345.0, 46_000.0, 65_535.0_f64] {
             for step in 0..4096 {
                 let theta = TAU * f64::from(step) / 4096.0 + 1e-3;
                 let (s1, s2) = ((radius * theta.cos()).round() as i32, (radius * theta.sin()).round() as i32);
@@ -114,15 +132,17 @@ mod tests {
                     let axis = 0.5 * f64::from(s2).atan2(f64::from(s1));
                     let want = axis.rem_euclid(PI) / PI * 65536.0;
                     let off = (f64::from(got.aolp_turn16) - want + 32768.0).rem_euclid(65536.0) - 32768.0;
-                    worst_angle = worst_angle.max(off.abs());
-                    let dolp = (f64::from(s1).hypot(f64::from(s2)) / f64::from(s0) * 65536.0).min(65535.0);
-                    worst_dolp =
-                        worst_dolp.max((f64::from(got.dolp_q16) - dolp).abs() - 2.0 * 65536.0 / f64::from(s0) / 8192.0);
+                    let r = f64::from(s1).hypot(f64::from(s2));
+                    worst_angle = worst_angle.max(off.abs() / (0.66 + 36.5 / r));
+                    let dolp = (r / f64::from(s0) * 65536.0).min(65535.0);
+                    let bound = 1.0 + 128.0 / f64::from(s0);
+                    worst_dolp = worst_dolp.max((f64::from(got.dolp_q16) - dolp).abs() / bound);
                 }
             }
         }
-        assert!(worst_angle <= 1.5, "AoLP off by {worst_angle} units");
-        assert!(worst_dolp <= 2.0, "DoLP off by {worst_dolp} units");
+        assert!(worst_angle <= 1.0, "AoLP off by {worst_angle} of its bound");
+        assert!(worst_dolp <= 1.0, "DoLP off by {worst_dolp} of its bound");
+        assert!(worst_angle > 0.5 && worst_dolp > 0.5, "a bound that is never approached says nothing");
     }
 
     #[test]

@@ -1,0 +1,12 @@
+//! A capture from a camera: finding it, fetching every plane, checking, and writing what a person wants.
+
+mod convert;
+mod deliver;
+mod device;
+mod receive;
+mod words;
+
+pub(crate) use deliver::{Delivery, deliver};
+pub(crate) use device::{DeviceArgs, Opened};
+pub(crate) use receive::{Received, receive};
+pub(crate) use words::link_failure;

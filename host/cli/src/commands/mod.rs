@@ -1,0 +1,38 @@
+//! The subcommands: one file (or folder) each.
+
+mod capture;
+mod completions;
+mod demo;
+mod devices;
+mod fetch;
+mod info;
+mod stokes;
+
+use crate::failure::Failure;
+use crate::terminal::{Outcome, Terminal};
+
+/// What to do.
+#[derive(clap::Subcommand)]
+pub(crate) enum Command {
+    Demo(demo::Demo),
+    Capture(capture::Capture),
+    Fetch(fetch::Fetch),
+    Stokes(Box<stokes::Stokes>),
+    Info(info::Info),
+    Devices(devices::Devices),
+    Completions(completions::Completions),
+}
+
+impl Command {
+    pub(crate) fn run(&self, terminal: &Terminal) -> Result<Outcome, Failure> {
+        match self {
+            Self::Demo(command) => command.run(terminal),
+            Self::Capture(command) => command.run(terminal),
+            Self::Fetch(command) => command.run(terminal),
+            Self::Devices(command) => command.run(terminal),
+            Self::Stokes(command) => command.run(terminal),
+            Self::Info(command) => command.run(),
+            Self::Completions(command) => Ok(command.run()),
+        }
+    }
+}

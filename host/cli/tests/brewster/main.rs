@@ -1,0 +1,8 @@
+//! The program as its users meet it: files in, folders and exit codes out.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail by panicking, as tests do")]
+
+mod bad_input;
+mod good_input;
+mod output;
+mod real_data;
+mod world;

@@ -1,0 +1,90 @@
+"""The camera's job in the programs people use today: 4 frames of 2448 x 2048 u16 to Stokes, then DoLP and AoLP.
+
+Single thread, everything in memory, results in each program's own type. The programs take turns, round by round, so that
+a slow moment of the machine hits all of them. None subtracts a dark level, drops saturated samples, or gives flags or a
+residual. Prints JSON: a list of {program, version, job, ms}, ms being one number per round.
+"""
+
+import json
+import os
+import time
+
+os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1")
+
+import cv2  # noqa: E402  (the number of threads is read on import)
+import numpy as np  # noqa: E402
+import polanalyser  # noqa: E402
+
+cv2.setNumThreads(1)
+
+HEIGHT, WIDTH, ROUNDS = 2048, 2448, 11
+# The kernel's benchmark takes these too: nobody may assume 0/45/90/135.
+ANGLES = np.deg2rad(0.7 + 45.0 * np.arange(4))
+
+
+def frames():
+    """(4, H, W) u16: s0 from 300 to 1500 DN across the picture, a degree of polarization of 0.3, 20 DN of noise."""
+    random = np.random.default_rng(1)
+    s0 = np.linspace(300, 1500, WIDTH)[None, :] * np.ones((HEIGHT, 1))
+    ideal = [0.5 * s0 * (1 + 0.3 * np.cos(2 * (angle - 0.5))) for angle in ANGLES]
+    return np.stack([np.rint(x + random.uniform(0, 20, x.shape)).astype(np.uint16) for x in ideal])
+
+
+ROWS = 0.5 * np.stack([np.ones(4), np.cos(2 * ANGLES), np.sin(2 * ANGLES)], axis=1)
+INVERSE = np.linalg.pinv(ROWS).astype(np.float32)
+
+
+def numpy_stokes(images):
+    return (INVERSE @ images.reshape(4, -1).astype(np.float32)).reshape(3, HEIGHT, WIDTH)
+
+
+def numpy_polar(images):
+    s0, s1, s2 = numpy_stokes(images)
+    return np.hypot(s1, s2) / s0, np.mod(0.5 * np.arctan2(s2, s1), np.pi)
+
+
+def opencv_stokes(images):
+    return cv2.transform(cv2.merge(list(images)).astype(np.float32), INVERSE)
+
+
+def opencv_polar(images):
+    s0, s1, s2 = cv2.split(opencv_stokes(images))
+    magnitude, angle = cv2.cartToPolar(s1, s2)
+    return cv2.divide(magnitude, s0), cv2.multiply(angle, 0.5)
+
+
+def polanalyser_stokes(images):
+    return polanalyser.calcStokes(images, ANGLES)
+
+
+def polanalyser_polar(images):
+    stokes = polanalyser_stokes(images)
+    return polanalyser.cvtStokesToDoLP(stokes), polanalyser.cvtStokesToAoLP(stokes)
+
+
+def main():
+    from importlib.metadata import version
+
+    programs = {
+        "numpy": ("numpy", numpy_stokes, numpy_polar),
+        "OpenCV": ("opencv-python-headless", opencv_stokes, opencv_polar),
+        "polanalyser": ("polanalyser", polanalyser_stokes, polanalyser_polar),
+    }
+    images = frames()
+    # The same job means the same answer.
+    reference = numpy_polar(images)
+    for name, (_, _, polar) in programs.items():
+        for mine, theirs in zip(reference, polar(images)):
+            assert np.allclose(mine, theirs, atol=2e-3), f"{name} computes something else"
+    results = {}
+    for _ in range(ROUNDS):
+        for name, (package, stokes, polar) in programs.items():
+            for job, work in (("Stokes", stokes), ("Stokes, DoLP, AoLP", polar)):
+                start = time.perf_counter()
+                work(images)
+                results.setdefault((name, version(package), job), []).append((time.perf_counter() - start) * 1e3)
+    print(json.dumps([{"program": p, "version": v, "job": j, "ms": ms} for (p, v, j), ms in results.items()]))
+
+
+if __name__ == "__main__":
+    main()

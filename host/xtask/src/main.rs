@@ -1,0 +1,117 @@
+//! The development loop. `cargo xtask` alone means "safe to push".
+//!
+//! Every step prints what it does and how long it took; all steps run, and the failed ones are named again at the end.
+
+mod arrows;
+mod docs;
+mod licenses;
+mod metadata;
+mod no_std;
+mod numerics;
+mod perf;
+mod process;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// The development loop; without a subcommand: safe to push?
+#[derive(Parser)]
+#[command(name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    step: Option<Step>,
+}
+
+#[derive(Clone, Copy, Subcommand)]
+enum Step {
+    /// Formatting, as rustfmt.toml says
+    Fmt {
+        /// Reformat instead of checking
+        #[arg(long)]
+        write: bool,
+    },
+    /// Clippy on everything, warnings are errors
+    Lint,
+    /// Every test
+    Test,
+    /// Equation table, error-bound table, links, and words that do not belong in any file
+    Docs,
+    /// The error-bound tables of docs/NUMERICS.md against the code
+    Numerics {
+        /// Write the tables instead of checking them
+        #[arg(long)]
+        write: bool,
+    },
+    /// Dependency arrows between the crates of this workspace
+    Arrows,
+    /// Licenses of all dependencies, stricter on the device's side
+    Licenses,
+    /// The device's crates built for a microcontroller with core and alloc only
+    NoStd,
+    /// Kernel benchmark and its peers; writes docs/PERFORMANCE.md
+    Perf,
+}
+
+impl Step {
+    /// What "safe to push" means, quick steps first.
+    const SAFE_TO_PUSH: [Self; 7] =
+        [Self::Fmt { write: false }, Self::Arrows, Self::Licenses, Self::Docs, Self::Lint, Self::NoStd, Self::Test];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Fmt { .. } => "fmt",
+            Self::Lint => "lint",
+            Self::Test => "test",
+            Self::Docs => "docs",
+            Self::Numerics { .. } => "numerics",
+            Self::Arrows => "arrows",
+            Self::Licenses => "licenses",
+            Self::NoStd => "no-std",
+            Self::Perf => "perf",
+        }
+    }
+
+    fn run(self) -> anyhow::Result<String> {
+        match self {
+            Self::Fmt { write: false } => process::cargo(&["fmt", "--all", "--check"]),
+            Self::Fmt { write: true } => process::cargo(&["fmt", "--all"]),
+            Self::Lint => process::cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]),
+            Self::Test => process::cargo(&["test", "--workspace"]),
+            Self::Docs => docs::check(),
+            Self::Numerics { write } => numerics::run(write),
+            Self::Arrows => arrows::check(),
+            Self::Licenses => licenses::check(),
+            Self::NoStd => no_std::check(),
+            Self::Perf => perf::run(),
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let steps = arguments.step.map_or_else(|| Step::SAFE_TO_PUSH.to_vec(), |step| vec![step]);
+    let mut failed = Vec::new();
+    for step in &steps {
+        println!("xtask {}", step.name());
+        let start = Instant::now();
+        let result = step.run();
+        let seconds = start.elapsed().as_secs_f64();
+        match result {
+            Ok(summary) => println!("xtask {}: ok, {summary} ({seconds:.1} s)", step.name()),
+            Err(error) => {
+                println!("xtask {}: FAILED after {seconds:.1} s: {error:#}", step.name());
+                failed.push(step.name());
+            }
+        }
+    }
+    if failed.is_empty() {
+        if steps.len() > 1 {
+            println!("safe to push");
+        }
+        ExitCode::SUCCESS
+    } else {
+        println!("failed: {}", failed.join(", "));
+        ExitCode::FAILURE
+    }
+}
