@@ -5,8 +5,8 @@ use crate::kernel::polar_form::polar_form;
 use crate::kernel::{Dark, StripInput, StripOutput, stokes_i16, stokes_i32};
 use crate::memory::Memory;
 use heapless::Vec;
-use protocol_polar::MAX_FRAMES;
 use protocol_polar::fixed::{StokesPlan, Word};
+use protocol_polar::{Flags, MAX_FRAMES};
 use protocol_wire::{Calibration, CaptureId, MAX_PLANES, PlaneInfo, PlaneKind, SensorInfo};
 
 /// Where a strip lies on the sensor.
@@ -139,14 +139,14 @@ pub(crate) struct Recipe<'a> {
     pub preview_step: u16,
 }
 
-/// Reads the strip from every slot, computes, and stores every plane of it.
+/// Reads the strip from every slot, computes, and stores every plane of it. Returns how many photosites are a misfit.
 pub(crate) fn compute_strip(
     recipe: &Recipe,
     area: Area,
     camera: &mut impl FrameSource,
     store: &mut impl CaptureStore,
     memory: &mut Memory,
-) -> Result<(), ComputeError> {
+) -> Result<u32, ComputeError> {
     let n = area.photosites();
     let frames = recipe.plan.frame_count();
     let mut inputs: Vec<&[u16], MAX_FRAMES> = Vec::new();
@@ -200,7 +200,7 @@ pub(crate) fn compute_strip(
     }
     let flags = memory.flags.get(..n).ok_or(ComputeError::Memory)?;
     store.write(recipe.id, PlaneKind::Flags, area.strip, flags, crc32fast::hash(flags))?;
-    Ok(())
+    Ok(flags.iter().map(|f| u32::from(Flags(*f).contains(Flags::MISFIT))).sum())
 }
 
 fn thirds<T>(values: &mut [T], n: usize) -> Result<[&mut [T]; 3], ComputeError> {

@@ -47,7 +47,7 @@ fn tables_text() -> Result<String> {
     let formats: Vec<(Word, u8, PlaneFormat)> = [Word::I16, Word::I32]
         .into_iter()
         .flat_map(|word| (8..=16).map(move |bits| (word, bits)))
-        .filter_map(|(word, bits)| PlaneFormat::for_sensor(word, bits).map(|format| (word, bits, format)))
+        .filter_map(|(word, bits)| PlaneFormat::for_bits(word, bits).map(|format| (word, bits, format)))
         .collect();
     for (word, bits, format) in &formats {
         let integer_bits = 8 * format.bytes() - 1 - usize::from(format.frac_bits);

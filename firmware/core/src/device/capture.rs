@@ -15,6 +15,9 @@ use protocol_wire::{
 /// Two axes closer than this are one to a wheel with a hobby servo.
 const SAME_AXIS: Degrees = Degrees(0.1);
 
+/// One photosite in so many may be a misfit before the capture as a whole is suspect.
+const MANY_MISFITS: u32 = 100;
+
 /// A capture under way.
 #[derive(Debug)]
 pub(super) struct CaptureJob {
@@ -24,6 +27,7 @@ pub(super) struct CaptureJob {
     course: Sequence,
     frames: Vec<FrameInfo, MAX_FRAMES>,
     plan: Option<StokesPlan>,
+    misfits: u32,
 }
 
 impl CaptureJob {
@@ -81,7 +85,7 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
         self.store.begin(id, total_bytes(&planes))?;
         self.next_id = CaptureId(id.0.wrapping_add(1));
         self.memory.weights.clear();
-        Ok(CaptureJob { id, sequence, request, course, frames: Vec::new(), plan: None })
+        Ok(CaptureJob { id, sequence, request, course, frames: Vec::new(), plan: None, misfits: 0 })
     }
 
     fn contents(&self, request: &CaptureRequest) -> Contents {
@@ -149,12 +153,20 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
                     preview_step: preview_step(&self.setup.sensor),
                 };
                 let area = Area::new(&self.setup.sensor, self.setup.strip_rows, strip);
-                compute_strip(&recipe, area, &mut self.camera, &mut self.store, &mut self.memory)?;
+                let misfits = compute_strip(&recipe, area, &mut self.camera, &mut self.store, &mut self.memory)?;
+                job.misfits = job.misfits.saturating_add(misfits);
                 job.course.computed();
             }
             Action::Finish => {
                 if job.course.clips() {
                     self.warn(job.sequence, "highlights clip at the shortest exposure; their samples were dropped");
+                }
+                let photosites = self.setup.sensor.width.saturating_mul(self.setup.sensor.height);
+                if job.misfits > photosites / MANY_MISFITS {
+                    self.warn(
+                        job.sequence,
+                        "the frames do not fit together: the wheel slips, something moved, or the light changed",
+                    );
                 }
                 let description = self.describe(job)?;
                 self.store.finish(&description)?;

@@ -88,7 +88,7 @@ impl ReplayCamera {
         setup.polarizer_efficiency = 1.0;
         let axes = self.album.pictures.iter().take(MAX_FRAMES).map(|picture| picture.axis.0);
         setup.default_frames = axes.map(|angle_deg| FrameRequest { angle_deg, exposure_ratio: 1.0 }).collect();
-        if PlaneFormat::for_sensor(setup.default_word.into(), bit_depth).is_none() {
+        if PlaneFormat::for_bits(setup.default_word.into(), bit_depth).is_none() {
             setup.default_word = Word::I32;
         }
     }

@@ -248,14 +248,20 @@ fn json(
     })
 }
 
-/// `raw/pol-060.13deg.png` and so on: names from which `brewster stokes` reads the angles. A repeated angle gets a letter.
+/// `raw/pol_060.130deg.png` and so on: names from which `brewster stokes` reads the angles. The second frame at the very
+/// same angle is `pol_060.130deg_2.png`.
 fn write_raw(received: &Received, folder: &OutputFolder) -> Result<(), Failure> {
     let raw = folder.path().join("raw");
     std::fs::create_dir(&raw).map_err(|error| pictures::unwritable(folder, &error))?;
     for (slot, frame) in (0_u8..).zip(&received.description.frames) {
         let Some(picture) = received.raw(slot) else { continue };
-        let letter = char::from(b'a' + slot % 26);
-        let path = raw.join(format!("frame-{letter}-pol{:07.3}deg.png", frame.angle_deg.rem_euclid(180.0)));
+        let name = format!("pol_{:07.3}deg", frame.angle_deg.rem_euclid(180.0));
+        let mut path = raw.join(format!("{name}.png"));
+        let mut number = 2;
+        while path.exists() {
+            path = raw.join(format!("{name}_{number}.png"));
+            number += 1;
+        }
         picture.write_png(&path).map_err(|error| Failure::writing(&error))?;
     }
     Ok(())

@@ -2,16 +2,19 @@
 
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
 use boards::Board;
 use firmware_emulator::{ByteLink, Clock, LinkGone, Running, Source, jack, start};
 use host_link::in_process::{DeviceEnd, pair};
 use host_link::{Address, Client, Transport};
+use protocol_wire::LogLevel;
 
 use super::words::link_failure;
 use crate::exit::Exit;
 use crate::failure::Failure;
+use crate::terminal::Terminal;
 
 /// How long to wait for a connection.
 const CONNECT: Duration = Duration::from_secs(5);
@@ -62,6 +65,8 @@ impl FromStr for DeviceName {
 pub(crate) struct Opened {
     pub(crate) client: Client<Box<dyn Transport>>,
     name: DeviceName,
+    /// Warnings of the camera's log, and where new sessions put them.
+    warnings: (Sender<String>, Receiver<String>),
     /// Keeps the emulated camera alive.
     _running: Option<Running>,
 }
@@ -93,8 +98,9 @@ impl DeviceArgs {
                 (Box::new(host), Some(running))
             }
         };
-        let client = connect(transport).map_err(|error| link_failure(&error, &self.device.to_string()))?;
-        Ok(Opened { client, name: self.device.clone(), _running: running })
+        let warnings = channel();
+        let client = connect(transport, &warnings.0).map_err(|error| link_failure(&error, &self.device.to_string()))?;
+        Ok(Opened { client, name: self.device.clone(), warnings, _running: running })
     }
 
     fn board(&self) -> Result<Board, Failure> {
@@ -115,12 +121,28 @@ impl Opened {
     /// Opens a new session after the link broke. `None`: there is no way back to this camera.
     pub(crate) fn reopen(&mut self) -> Option<Result<(), host_link::LinkError>> {
         let DeviceName::At(address) = &self.name else { return None };
-        Some(address.open(CONNECT).and_then(connect).map(|client| self.client = client))
+        let opened = address.open(CONNECT).and_then(|transport| connect(transport, &self.warnings.0));
+        Some(opened.map(|client| self.client = client))
+    }
+
+    /// Passes the camera's warnings on.
+    pub(crate) fn tell_warnings(&self, terminal: &Terminal) {
+        self.warnings.1.try_iter().for_each(|text| terminal.warn(format!("the camera says: {text}")));
     }
 }
 
-fn connect(transport: Box<dyn Transport>) -> Result<Client<Box<dyn Transport>>, host_link::LinkError> {
-    Client::connect(transport, concat!("brewster ", env!("CARGO_PKG_VERSION")))
+fn connect(
+    transport: Box<dyn Transport>,
+    warnings: &Sender<String>,
+) -> Result<Client<Box<dyn Transport>>, host_link::LinkError> {
+    let mut client = Client::connect(transport, concat!("brewster ", env!("CARGO_PKG_VERSION")))?;
+    let warnings = warnings.clone();
+    client.on_log(move |log| {
+        if log.level == LogLevel::Warning {
+            warnings.send(log.text.to_string()).ok(); // nobody reads once the command has ended
+        }
+    });
+    Ok(client)
 }
 
 fn open_address(address: &Address) -> Result<Box<dyn Transport>, Failure> {

@@ -110,6 +110,7 @@ pub(crate) fn take(opened: &mut Opened, request: CaptureRequest, terminal: &Term
         ControlFlow::Continue(())
     });
     progress.finish_and_clear();
+    opened.tell_warnings(terminal);
     result.map_err(|error| link_failure(&error, &name))
 }
 

@@ -19,13 +19,16 @@ pub struct PlaneFormat {
 }
 
 impl PlaneFormat {
-    /// The format for a sensor of `bit_depth` bits: one bit for the sign, one because s0 is a sum of two orthogonal
+    /// The format for signals of up to `bits` bits: one bit more for the sign, one because s0 is a sum of two orthogonal
     /// powers, the rest below the binary point (12 bits: Q13.2 in i16, Q15.16 in i32). `None` where it does not fit.
+    ///
+    /// `bits` is the sensor's bit depth; frames of lower throughput than the reference add what the brightest light they
+    /// can hold is above it (a quarter of the exposure: two bits).
     #[must_use]
-    pub const fn for_sensor(word: Word, bit_depth: u8) -> Option<Self> {
-        match (word, bit_depth) {
-            (Word::I16, 8..=14) => Some(Self { word, frac_bits: 14 - bit_depth }),
-            (Word::I32, 8..=16) => Some(Self { word, frac_bits: 28 - bit_depth }),
+    pub const fn for_bits(word: Word, bits: u8) -> Option<Self> {
+        match (word, bits) {
+            (Word::I16, 8..=14) => Some(Self { word, frac_bits: 14 - bits }),
+            (Word::I32, 8..=28) => Some(Self { word, frac_bits: 28 - bits }),
             _ => None,
         }
     }

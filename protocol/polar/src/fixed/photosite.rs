@@ -48,8 +48,12 @@ impl StokesPlan {
         let stokes = before_flat.map(|s| clamp((i64::from(s) * i64::from(gain.0) + (1 << 14)) >> 15));
 
         let rows = weights.residual_rows();
-        // At most N D² 2^2F / (N − 3) < 2^59: the rows carry 1/√(N − 3).
-        let sum: u64 = rows.iter().map(|row| component(row, samples, dark).unsigned_abs()).map(|r| r * r).sum();
+        // Rows grow with 1/√throughput: a square that is beyond the largest residual stays beyond it when clamped.
+        let square = |row| {
+            let r = component(row, samples, dark).unsigned_abs().min(u32::MAX.into());
+            r * r
+        };
+        let sum = rows.iter().map(square).fold(0, u64::saturating_add);
         let limit = self.format().residual_limit();
         let rms = u32::try_from(sum.isqrt()).unwrap_or(u32::MAX).min(limit);
         let misfit = weights.misfit();

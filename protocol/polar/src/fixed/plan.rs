@@ -70,8 +70,12 @@ impl StokesPlan {
     /// # Errors
     /// [`FixedError`], as its variants say.
     pub fn new(frames: &[Analyzer], word: Word, range: SensorRange, noise: Noise) -> Result<Self, FixedError> {
-        let format = PlaneFormat::for_sensor(word, range.bit_depth)
-            .ok_or(FixedError::Unsupported { word, bit_depth: range.bit_depth })?;
+        let unsupported = FixedError::Unsupported { word, bit_depth: range.bit_depth };
+        if !(8..=16).contains(&range.bit_depth) {
+            return Err(unsupported);
+        }
+        let bits = range.bit_depth.saturating_add(headroom_bits(frames));
+        let format = PlaneFormat::for_bits(word, bits).ok_or(unsupported)?;
         if range.white_level == 0 || u32::from(range.white_level) >= 1_u32 << range.bit_depth {
             return Err(FixedError::WhiteLevel { white_level: range.white_level });
         }
@@ -177,4 +181,13 @@ impl StokesPlan {
             slope: (libm::ceil(slope.max(0.0)) as u64).min(slope_limit),
         }
     }
+}
+
+/// How many bits the light that the shortest frame can hold is above the reference's range.
+///
+/// A ratio of a quarter that an exposure rounds to 0.2499 is still two bits: 3 % are left to clamping and its flag.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped just before")]
+fn headroom_bits(frames: &[Analyzer]) -> u8 {
+    let least = frames.iter().map(|frame| frame.throughput).fold(1.0, f64::min);
+    libm::ceil(libm::log2(1.0 / least.max(1e-9)) - 0.05).clamp(0.0, 30.0) as u8
 }
