@@ -93,8 +93,9 @@ impl Fetched {
         StokesPlan::new(&self.analyzers(), self.description.word.into(), range, noise).unwrap()
     }
 
-    /// How far the stored integers are from least squares by another way: the largest ratio of |stored − exact| to the proved bound of the photosite's own set of frames, over every photosite
-    /// that was computed. (Without maps; frames of equal exposure.)
+    /// How far the stored integers are from least squares by another way: the largest ratio of |stored − exact| to the proved
+    /// bound of the photosite's own set of frames, over every photosite that was computed. (Without maps; frames of equal
+    /// exposure.)
     #[must_use]
     pub fn worst_of_bound(&self) -> f64 {
         let (plan, analyzers, raw) = (self.plan(), self.analyzers(), self.raw());

@@ -130,3 +130,24 @@ fn converse(transport: impl Transport) -> Conversation {
     let said = said.lock().unwrap();
     said.clone()
 }
+
+/// The preview planes of light at 30° and DoLP 0.6, from either word, strips that end in the middle of a square included.
+#[test]
+fn previews_show_the_light() {
+    let field = firmware_emulator::uniform(330, 250, 3000.0, 0.6, Degrees(30.0));
+    let bench = Bench::start(Camera::analytic(&board_of(330, 250), field, Clock::virtual_time()).unwrap());
+    let mut client = bench.connect();
+    for word in [Word::I16, Word::I32] {
+        let mut request = capture_request(&[0.0, 60.0, 120.0], Exposure::Auto);
+        request.word = word;
+        let id = client.capture(request, |_| CONTINUE).unwrap();
+        let fetched = Fetched::fetch(&mut client, id);
+        let (dolp, aolp) = (fetched.bytes(PlaneKind::PreviewDolp), fetched.bytes(PlaneKind::PreviewAolp));
+        assert_eq!((dolp.len(), aolp.len()), (165 * 125, 165 * 125));
+        // 256 units are a DoLP of 1, and 180°. Noise: four photosites to a square.
+        let mean = |plane: &[u8]| plane.iter().map(|v| f64::from(*v)).sum::<f64>() / plane.len() as f64;
+        assert!((mean(dolp) - (0.6 * 256.0 - 0.5)).abs() < 1.0, "{word:?}: {}", mean(dolp));
+        assert!((mean(aolp) - (30.0 / 180.0 * 256.0 - 0.5)).abs() < 1.0, "{word:?}: {}", mean(aolp));
+        assert!(dolp.iter().all(|v| (130..180).contains(v)) && aolp.iter().all(|v| (35..50).contains(v)));
+    }
+}

@@ -2,6 +2,7 @@
 
 use super::{Device, Step};
 use crate::compute::Area;
+use crate::exposure::{ExposureSearch, Verdict};
 use crate::hardware::{CaptureStore, FrameSource, Micros, Wheel, text};
 use protocol_polar::Degrees;
 use protocol_polar::fixed::GainQ15;
@@ -14,6 +15,9 @@ pub(super) struct CalibrationJob {
     flat: bool,
     frames: u8,
     taken: u8,
+    /// The exposure of the flat field is metered first; the dark map is taken at that of the last capture.
+    search: Option<ExposureSearch>,
+    exposure_us: u32,
 }
 
 impl CalibrationJob {
@@ -44,19 +48,36 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
         if !(1..=16).contains(&frames) {
             return Err(Refusal::OutOfRange(text("frames (1 to 16)")));
         }
-        Ok(Some(CalibrationJob { sequence, flat, frames, taken: 0 }))
+        let sensor = &self.setup.sensor;
+        let range = (sensor.black_level_dn, sensor.white_level_dn);
+        let exposure_us = self.last_exposure_us;
+        let search = flat.then(|| ExposureSearch::new(exposure_us, self.setup.exposure_limits_us, range));
+        Ok(Some(CalibrationJob { sequence, flat, frames, taken: 0, search, exposure_us }))
     }
 
-    /// Takes one picture, or makes the map. Pictures are taken at the exposure of the last capture: dark current counts.
+    /// Takes one picture, or makes the map.
     pub(super) fn calibration_step(&mut self, job: &mut CalibrationJob, now: Micros) -> Result<Step, Refusal> {
+        if let Some(search) = &mut job.search {
+            self.wheel.move_to(Degrees(0.0))?;
+            self.camera.expose(0, search.exposure_us(), now).map_err(|error| Refusal::CameraFailed(error.0))?;
+            search.observe(self.level(0)?);
+            match search.decide() {
+                Verdict::Again(_) => {}
+                Verdict::Locked { exposure_us, .. } => {
+                    job.exposure_us = exposure_us;
+                    job.search = None;
+                }
+                Verdict::TooBright => return Err(Refusal::TooBright),
+            }
+            return Ok(Step::More);
+        }
         if job.taken < job.frames {
             if job.flat {
                 // Around the half turn, so that polarization of the field averages out.
                 let axis = Degrees(180.0 * f64::from(job.taken) / f64::from(job.frames));
                 self.wheel.move_to(axis)?;
             }
-            let exposure_us = self.last_exposure_us;
-            self.camera.expose(job.taken, exposure_us, now).map_err(|error| Refusal::CameraFailed(error.0))?;
+            self.camera.expose(job.taken, job.exposure_us, now).map_err(|error| Refusal::CameraFailed(error.0))?;
             job.taken += 1;
             return Ok(Step::More);
         }

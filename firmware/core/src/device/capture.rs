@@ -197,7 +197,7 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
     }
 
     /// How bright the picture in `slot` is, from one row in eight.
-    fn level(&mut self, slot: u8) -> Result<Level, Refusal> {
+    pub(super) fn level(&mut self, slot: u8) -> Result<Level, Refusal> {
         let sensor = &self.setup.sensor;
         let mut histogram = Histogram::new(sensor.bit_depth, sensor.white_level_dn);
         let width = usize::try_from(sensor.width).unwrap_or(0);

@@ -1,5 +1,6 @@
 //! The subcommands: one file (or folder) each.
 
+mod calibrate;
 mod capture;
 mod completions;
 mod demo;
@@ -17,6 +18,7 @@ pub(crate) enum Command {
     Demo(demo::Demo),
     Capture(capture::Capture),
     Fetch(fetch::Fetch),
+    Calibrate(calibrate::Calibrate),
     Stokes(Box<stokes::Stokes>),
     Info(info::Info),
     Devices(devices::Devices),
@@ -29,6 +31,7 @@ impl Command {
             Self::Demo(command) => command.run(terminal),
             Self::Capture(command) => command.run(terminal),
             Self::Fetch(command) => command.run(terminal),
+            Self::Calibrate(command) => command.run(terminal),
             Self::Devices(command) => command.run(terminal),
             Self::Stokes(command) => command.run(terminal),
             Self::Info(command) => command.run(),

@@ -13,6 +13,7 @@ const USAGE: i32 = 2;
 const BAD_INPUT: i32 = 3;
 const OUTPUT: i32 = 4;
 const DEVICE: i32 = 5;
+const REFUSED: i32 = 6;
 const NOT_IDENTIFIABLE: i32 = 7;
 
 #[test]
@@ -78,7 +79,7 @@ fn a_set_that_determines_nothing_is_refused_before_anything_is_made() {
         );
     }
     w.refused(&["capture", "-d", "emulated", "--angles", "10,10.5,11"], NOT_IDENTIFIABLE, &["close together"]);
-    w.refused(&["capture", "-d", "emulated", "--angles", "0,60,nan"], 6, &["angle_deg"]);
+    w.refused(&["capture", "-d", "emulated", "--angles", "0,60,nan"], REFUSED, &["angle_deg"]);
 }
 
 #[test]
@@ -91,6 +92,15 @@ fn words_that_make_no_sense() {
     w.refused(&["capture", "-d", "emulated:replay:nowhere"], BAD_INPUT, &["nowhere"]);
     std::fs::write(w.path("b.toml"), "schema = 1\n[board]\nname = 3\n").unwrap();
     w.refused(&["capture", "-d", "emulated", "--board", "b.toml"], BAD_INPUT, &["b.toml"]);
+}
+
+#[test]
+fn calibration_pictures_are_looked_at() {
+    let w = World::new();
+    w.ok(&["calibrate", "flat", "-d", "emulated:uniform:3000,0,0", "--frames", "4"]);
+    w.refused(&["calibrate", "dark", "-d", "emulated:uniform:3000,0,0"], REFUSED, &["dark picture is bright", "cap"]);
+    w.refused(&["calibrate", "flat", "-d", "emulated:uniform:0.01,0,0"], REFUSED, &["too dark"]);
+    w.refused(&["calibrate", "flat", "--frames", "17"], USAGE, &["17"]);
 }
 
 #[test]
