@@ -1,0 +1,246 @@
+//! How the specular part of eq. 6 is evaluated, and the choice for each surface of a view.
+
+use super::chart::Field;
+use super::effects::normal_variation;
+use super::kernel::{Facets, Fineness, Rgb};
+use super::light::{BandLight, SunPoints};
+use super::numbers::single3;
+use super::prefilter::Pyramid;
+use super::survey::Pixels;
+use super::table::{Lanes, Table, lanes};
+use super::{EffectSet, OpticalEffect, Surface};
+use glam::{DVec3, Vec3};
+use host_optics::Microfacet;
+use host_optics::integral::{Adaptive, FixedPoints, View, discrete};
+
+/// How paper eq. 6 is evaluated where the surface is rough. A surface without its roughness is a mirror under any of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Evaluation {
+    /// Against prefiltered Stokes light (or fixed points under a smooth formula), tabulated over mirror directions and views
+    /// until interpolation errs by no more than `tolerance` at test pixels, relative to s0.
+    Prefiltered {
+        /// Largest error of interpolation.
+        tolerance: f64,
+    },
+    /// [`FixedPoints`] of this many rings at every pixel.
+    Points {
+        /// r of the 2 r² points.
+        rings: u32,
+    },
+    /// [`Adaptive`] to this tolerance at every pixel: the reference.
+    Adaptive {
+        /// Relative to s0.
+        tolerance: f64,
+    },
+}
+
+/// What a surface of a view was evaluated with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Method {
+    /// No pixel shows it.
+    Absent,
+    /// A table of so many nodes, with the largest error of interpolation at test pixels relative to s0.
+    Table {
+        /// Nodes computed.
+        nodes: usize,
+        /// Measured error.
+        error: f64,
+    },
+    /// Every pixel for itself.
+    Direct,
+}
+
+/// What evaluates one point.
+#[derive(Clone, Debug)]
+pub(crate) enum Rule {
+    Mirror,
+    Cells(Fineness),
+    Points(FixedPoints),
+    Adaptive(Adaptive),
+}
+
+/// Everything an evaluation at one normal and view needs.
+pub(crate) struct Point<'a> {
+    pub(crate) light: &'a [BandLight<'a>; 3],
+    pub(crate) polarized: bool,
+    pub(crate) gray: bool,
+    pub(crate) sky: Option<&'a Pyramid>,
+    pub(crate) sun: &'a SunPoints,
+    pub(crate) surface: &'a Surface,
+    pub(crate) facets: Facets,
+    pub(crate) rule: Rule,
+    pub(crate) camera_x: DVec3,
+}
+
+/// The specular part of one surface in one view.
+#[derive(Debug)]
+pub(crate) enum Specular {
+    Absent,
+    /// One normal for all: over ω_o alone.
+    Flat(Field<12>),
+    Table(Table),
+    Direct,
+}
+
+/// Test pixels of a table.
+const TESTS: usize = 32;
+/// Halvings of a grid's step before it is given up.
+const REFINEMENTS: usize = 5;
+
+/// A sum over cells errs as the square of their size: 0.1 of the lobe's width is good to about 1e-3 of s0 under a map with a low
+/// sun, 0.2 to 3e-3.
+fn fineness(tolerance: f64) -> Fineness {
+    Fineness((10.0 * tolerance).sqrt().clamp(0.03, 0.3))
+}
+
+/// Rings at the nodes of a table under a smooth sky, whose error is well below the table's.
+fn node_rings(tolerance: f64) -> u32 {
+    if tolerance >= 2e-4 { 12 } else { 16 }
+}
+
+impl Rule {
+    /// The rule for a surface's nodes or pixels.
+    pub(crate) fn choose(
+        evaluation: Evaluation,
+        effects: EffectSet,
+        smooth: bool,
+        surface: &Surface,
+        texel: f64,
+    ) -> Self {
+        if !effects.contains(OpticalEffect::Roughness) {
+            return Self::Mirror;
+        }
+        match evaluation {
+            // Where the lobe is narrower than a texel, cells would be seen as points.
+            Evaluation::Prefiltered { tolerance } if smooth || surface.ggx.alpha() < 1.5 * texel => {
+                Self::Points(FixedPoints::new(node_rings(tolerance)))
+            }
+            Evaluation::Prefiltered { tolerance } => Self::Cells(fineness(tolerance)),
+            Evaluation::Points { rings } => Self::Points(FixedPoints::new(rings)),
+            Evaluation::Adaptive { tolerance } => Self::Adaptive(Adaptive::new(tolerance)),
+        }
+    }
+}
+
+impl Point<'_> {
+    /// Stokes of three bands in the camera frame of `wo`. Black where the camera has no frame (a ray along its x axis).
+    pub(crate) fn at(&self, normal: DVec3, wo: DVec3) -> Rgb {
+        let Ok(view) = View::new(wo, self.camera_x) else { return [[0.0; 3]; 3] };
+        let mut out = match &self.rule {
+            Rule::Mirror if self.polarized => return self.facets.mirror::<true>(self.light, self.sun, normal, &view),
+            Rule::Mirror => return self.facets.mirror::<false>(self.light, self.sun, normal, &view),
+            Rule::Cells(fineness) => match self.sky {
+                Some(sky) if sky.polarized() => self.facets.prefiltered::<true>(sky, *fineness, normal, &view),
+                Some(sky) => self.facets.prefiltered::<false>(sky, *fineness, normal, &view),
+                None => [[0.0; 3]; 3],
+            },
+            Rule::Points(rule) => self.bands(|band, surface| rule.specular(band, surface, normal, &view)),
+            Rule::Adaptive(rule) => self.bands(|band, surface| rule.specular(band, surface, normal, &view).value),
+        };
+        if !self.sun.points.is_empty() {
+            let sun = match self.rule {
+                Rule::Adaptive(_) => self.exact_sun(normal, &view),
+                _ => self.facets.sun(self.sun, normal, &view),
+            };
+            for (s, more) in out.iter_mut().flatten().zip(sun.iter().flatten()) {
+                *s += more;
+            }
+        }
+        out
+    }
+
+    /// Three bands, or one for all where nothing tells them apart.
+    fn bands(&self, value: impl Fn(&BandLight<'_>, &Microfacet) -> [f64; 3]) -> Rgb {
+        let one = |k: usize| value(&self.light[k], &Microfacet { ior: self.surface.ior[k], ggx: self.surface.ggx });
+        if self.gray { [one(0); 3] } else { [one(0), one(1), one(2)] }
+    }
+
+    fn exact_sun(&self, normal: DVec3, view: &View) -> Rgb {
+        let one = |k: usize| {
+            let light = host_optics::sky::Uniform { radiance: self.sun.radiance[k] };
+            let surface = Microfacet { ior: self.surface.ior[k], ggx: self.surface.ggx };
+            discrete(&light, &self.sun.points, &surface, normal, view)
+        };
+        [one(0), one(1), one(2)]
+    }
+}
+
+impl Specular {
+    /// For one surface. A table is tried where it is cheaper than its pixels, and kept if its measured error fits.
+    pub(crate) fn plan(
+        pixels: &Pixels<'_>,
+        point: &Point<'_>,
+        evaluation: Evaluation,
+        effects: EffectSet,
+    ) -> (Self, Method) {
+        let (smooth, tolerance) = match evaluation {
+            Evaluation::Prefiltered { tolerance } => (point.light.iter().all(|b| b.map().is_none()), tolerance),
+            _ => return (Self::Direct, Method::Direct),
+        };
+        // A mirror under a map is as sharp as the map.
+        if matches!(point.rule, Rule::Mirror) && !smooth {
+            return (Self::Direct, Method::Direct);
+        }
+        let flat = !effects.contains(OpticalEffect::NormalVariation);
+        let limit = pixels.extent.pixels / 2 + 64;
+        // One normal leaves two coordinates of four.
+        let tests = pixels.some(if flat { TESTS / 2 } else { TESTS });
+        let mut step = if smooth { 0.15 } else { point.surface.ggx.alpha().clamp(0.01, 0.15) };
+        for _ in 0..REFINEMENTS {
+            let (plan, nodes) = if flat {
+                let normal = normal_variation::mean(pixels.extent);
+                let size = pixels.view.size() / step + 4.0;
+                if size * size > super::numbers::real(limit) {
+                    break;
+                }
+                let field = Field::build(pixels.view_chart, &pixels.view, step, |wo| lanes(&point.at(normal, wo)));
+                let nodes = field.nodes();
+                (Self::Flat(field), nodes)
+            } else {
+                let Some(table) = Table::build(pixels, step, limit, |n, wo| point.at(n, wo)) else { break };
+                let nodes = table.computed();
+                (Self::Table(table), nodes)
+            };
+            let error = plan.error(&tests, pixels, point, flat);
+            if error <= tolerance {
+                return (plan, Method::Table { nodes, error });
+            }
+            // Cubic interpolation: the error falls as the fourth power of the step.
+            step *= if error > 20.0 * tolerance { 0.4 } else { 0.6 };
+        }
+        (Self::Direct, Method::Direct)
+    }
+
+    /// Largest difference from direct evaluation at test pixels, relative to s0 (of at least a hundredth of the brightest's).
+    fn error(&self, tests: &[(Vec3, Vec3)], pixels: &Pixels<'_>, point: &Point<'_>, flat: bool) -> f64 {
+        use rayon::prelude::*;
+        let mean = normal_variation::mean(pixels.extent);
+        let pairs: Vec<(Lanes, Lanes)> = tests
+            .par_iter()
+            .map(|(n, o)| {
+                let normal = if flat { mean } else { n.as_dvec3().normalize() };
+                let exact = lanes(&point.at(normal, o.as_dvec3().normalize()));
+                (self.lookup(single3(normal), *o), exact)
+            })
+            .collect();
+        let brightest = pairs.iter().map(|(_, e)| e[0].max(e[3]).max(e[6])).fold(0.0_f32, f32::max);
+        let relative = pairs.iter().flat_map(|(found, exact)| {
+            (0..9).map(move |k| {
+                let s0 = exact[k - k % 3].max(0.01 * brightest);
+                if s0 > 0.0 { f64::from((found[k] - exact[k]).abs() / s0) } else { 0.0 }
+            })
+        });
+        relative.fold(0.0, f64::max)
+    }
+
+    /// Nine numbers at a pixel; of a direct plan nothing.
+    pub(crate) fn lookup(&self, normal: Vec3, wo: Vec3) -> Lanes {
+        match self {
+            Self::Flat(field) => field.at(wo),
+            Self::Table(table) => table.at(normal, wo),
+            Self::Absent | Self::Direct => [0.0; 12],
+        }
+    }
+}
