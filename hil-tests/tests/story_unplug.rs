@@ -257,3 +257,26 @@ fn a_cancelled_capture_leaves_nothing() {
     assert_eq!(client.status().unwrap().free_bytes, free);
     assert!(client.capture(request(), |_| CONTINUE).is_ok());
 }
+
+/// A camera that lost its memory takes the same capture of the same light under the same name: its strips do not complete
+/// the first one, however alike everything else is.
+#[test]
+fn strips_of_another_start_do_not_complete_a_capture() {
+    let (board, clock) = (board_of(320, 240), Clock::virtual_time());
+    let bench = Bench::start(camera_of(&board, &clock));
+    let mut client = bench.connect();
+    let id = client.capture(request(), |_| CONTINUE).unwrap();
+    let mut plane = PlaneBuffer::new(&client.describe(id).unwrap(), PlaneKind::S0).unwrap();
+    drop(bench.power_cut());
+
+    let mut camera = camera_of(&board, &Clock::virtual_time());
+    camera.setup.boot = 2;
+    let bench = Bench::start(camera);
+    let mut client = bench.connect();
+    assert_eq!(client.capture(request(), |_| CONTINUE).unwrap(), id, "the name comes again");
+    let again = client.describe(id).unwrap();
+    let error = client.fetch_plane(&again, &mut plane, |_, _| {}).unwrap_err();
+    assert!(matches!(error, LinkError::OtherCapture { .. }), "{error}");
+    let mut own = PlaneBuffer::new(&again, PlaneKind::S0).unwrap();
+    client.fetch_plane(&again, &mut own, |_, _| {}).unwrap();
+}

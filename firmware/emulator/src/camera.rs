@@ -8,6 +8,7 @@ use crate::{
 use boards::{Board, Encoder, EncoderChip};
 use firmware_core::kernel::WeightTable;
 use firmware_core::{Activity, Device, FrameSource, Lengths, Memory, Setup, SetupError, Wheel};
+use std::hash::{BuildHasher, Hasher};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
@@ -39,7 +40,7 @@ pub struct Running {
     thread: Option<JoinHandle<Result<MemoryStore, SetupError>>>,
 }
 
-/// Builds the camera that `source` calls for and starts it behind `port`.
+/// Builds the camera that `source` calls for and starts it behind `port`, under a boot number of its own.
 ///
 /// # Errors
 /// [`EmulatorError`].
@@ -52,13 +53,13 @@ pub fn start(
     match source {
         Source::WheelChart => {
             let field = wheel_chart(board.sensor.width_px, board.sensor.height_px);
-            Camera::analytic(board, field, clock)?.spawn(port)
+            Camera::analytic(board, field, clock)?.booted().spawn(port)
         }
         Source::Uniform { s0_dn, dolp, aolp } => {
             let field = uniform(board.sensor.width_px, board.sensor.height_px, *s0_dn, *dolp, *aolp);
-            Camera::analytic(board, field, clock)?.spawn(port)
+            Camera::analytic(board, field, clock)?.booted().spawn(port)
         }
-        Source::Replay(source) => Camera::replay(board, source, clock)?.spawn(port),
+        Source::Replay(source) => Camera::replay(board, source, clock)?.booted().spawn(port),
     }
 }
 
@@ -96,6 +97,14 @@ impl<W: Wheel, C: FrameSource> Camera<W, C> {
     pub fn of(board: &Board, wheel: W, sensor: C, clock: Clock) -> Self {
         let store = MemoryStore::new(u64::from(board.memory.budget_mb) * 1_000_000);
         Self { setup: setup(board, 1, store.next_id()), wheel, sensor, store, clock }
+    }
+
+    /// The same camera with a boot number that no other start of it has had. (Without, it is 1: tests are to repeat.)
+    fn booted(mut self) -> Self {
+        // The standard library's hash seeds are the one source of randomness that needs no further crate.
+        let [a, b, c, d, ..] = std::hash::RandomState::new().build_hasher().finish().to_le_bytes();
+        self.setup.boot = u32::from_le_bytes([a, b, c, d]).max(1);
+        self
     }
 
     /// The same camera with what another one had stored.

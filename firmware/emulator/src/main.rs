@@ -9,6 +9,7 @@ use firmware_emulator::{Clock, Source, TcpPort, start};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 /// An emulated brewster camera: the real firmware around emulated chips.
 #[derive(Debug, Parser)]
@@ -31,14 +32,23 @@ struct Arguments {
     real_time: bool,
 }
 
-fn main() -> anyhow::Result<()> {
-    let arguments = Arguments::parse();
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let board = match &arguments.board {
         Some(file) => Board::read(file)?,
         None => Board::parse(boards::EMULATED_TOML, Path::new("emulated.toml"))?,
     };
     let clock = if arguments.real_time { Clock::real_time() } else { Clock::virtual_time() };
-    let (running, listening) = match (arguments.tcp, arguments.unix) {
+    let (running, listening) = match (arguments.tcp, &arguments.unix) {
         (Some(address), _) => {
             let port = TcpPort::bind(address)?;
             let address = port.address().context("the socket has no address")?;
@@ -47,7 +57,7 @@ fn main() -> anyhow::Result<()> {
         #[cfg(unix)]
         (None, Some(path)) => {
             let listening = format!("unix:{}", path.display());
-            (start(&board, &arguments.source, clock, UnixPort::bind(path)?)?, listening)
+            (start(&board, &arguments.source, clock, UnixPort::bind(path.clone())?)?, listening)
         }
         _ => bail!("nowhere to listen: give --tcp ADDRESS"),
     };

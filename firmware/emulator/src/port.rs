@@ -7,8 +7,10 @@ use firmware_core::{ByteLink, LinkGone};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 #[cfg(unix)]
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
+#[cfg(unix)]
 use std::os::unix::net::{UnixListener, UnixStream};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 /// Gives the link to the host that is connected.
@@ -58,7 +60,7 @@ pub struct SocketPort<L: Listen> {
     listener: L,
     host: Option<SocketLink<L::Stream>>,
     /// To be removed at the end.
-    file: Option<PathBuf>,
+    file: Option<(PathBuf, FileIdentity)>,
 }
 
 /// A connected socket that never blocks.
@@ -133,7 +135,12 @@ impl UnixPort {
     /// # Errors
     /// [`EmulatorError::Io`] where something else is there, or a camera still listens.
     pub fn bind(path: PathBuf) -> Result<Self, EmulatorError> {
-        let left_over = || UnixStream::connect(&path).is_err_and(|error| error.kind() == ErrorKind::ConnectionRefused);
+        let left_over = || {
+            let is_socket = std::fs::symlink_metadata(&path).is_ok_and(|file| file.file_type().is_socket());
+            let refuses =
+                || UnixStream::connect(&path).is_err_and(|error| error.kind() == ErrorKind::ConnectionRefused);
+            is_socket && refuses()
+        };
         let bound = match UnixListener::bind(&path) {
             Err(error) if error.kind() == ErrorKind::AddrInUse && left_over() => {
                 std::fs::remove_file(&path).and_then(|()| UnixListener::bind(&path))
@@ -142,7 +149,7 @@ impl UnixPort {
         };
         let listening = bound.and_then(|listener| listener.set_nonblocking(true).map(|()| listener));
         match listening {
-            Ok(listener) => Ok(Self { listener, host: None, file: Some(path) }),
+            Ok(listener) => Ok(Self { listener, host: None, file: identity(&path).map(|found| (path, found)) }),
             Err(source) => Err(EmulatorError::Io { path, source }),
         }
     }
@@ -163,10 +170,25 @@ impl<L: Listen> Port for SocketPort<L> {
     }
 }
 
+/// Device and inode.
+type FileIdentity = (u64, u64);
+
+#[cfg(unix)]
+fn identity(path: &Path) -> Option<FileIdentity> {
+    let file = std::fs::symlink_metadata(path).ok()?;
+    Some((file.dev(), file.ino()))
+}
+
+#[cfg(not(unix))]
+fn identity(_: &Path) -> Option<FileIdentity> {
+    None
+}
+
 impl<L: Listen> Drop for SocketPort<L> {
     fn drop(&mut self) {
-        if let Some(file) = &self.file {
-            std::fs::remove_file(file).ok(); // somebody else may have removed it
+        // Only the file that was made here: another camera may have put its own in its place.
+        if let Some((path, _)) = self.file.as_ref().filter(|(path, made)| identity(path).as_ref() == Some(made)) {
+            std::fs::remove_file(path).ok(); // somebody else may just have removed it
         }
     }
 }
@@ -199,5 +221,29 @@ impl<S: Read + Write> ByteLink for SocketLink<S> {
         }
         let result = self.stream.write(bytes);
         self.outcome(result)
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_no_socket_is_left_alone() {
+        let path = std::env::temp_dir().join(format!("brewster-port-{}", std::process::id()));
+        std::fs::write(&path, "precious").unwrap();
+        assert!(UnixPort::bind(path.clone()).is_err());
+        assert_eq!(std::fs::read(&path).unwrap(), b"precious");
+        std::fs::remove_file(&path).unwrap();
+
+        // The file of a camera that crashed is replaced; a newer camera's file is not taken along.
+        drop(UnixListener::bind(&path).unwrap());
+        let old = UnixPort::bind(path.clone()).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let new = UnixPort::bind(path.clone()).unwrap();
+        drop(old);
+        assert!(path.exists());
+        drop(new);
+        assert!(!path.exists());
     }
 }

@@ -61,7 +61,7 @@ impl CaptureStore for MemoryStore {
             return Err(StoreError::Full { needed: bytes, free });
         }
         if self.captures.len() >= MAX_CAPTURES {
-            return Err(StoreError::Failed(text("as many captures as can be listed are held; release some")));
+            return Err(StoreError::Failed(text("it holds as many captures as it can list; fetch some of them")));
         }
         self.captures.insert(id, Held { bytes, description: None, strips: HashMap::new() });
         Ok(())

@@ -184,6 +184,7 @@ mod tests {
         };
         CaptureDescription {
             id: CaptureId(5),
+            boot: 1,
             state: CaptureState::Complete,
             sensor,
             frames: [].into_iter().collect(),

@@ -184,6 +184,11 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Deframer<B> {
         pending
     }
 
+    /// Whether a frame has begun whose rest is still to come (after [`Self::next_event`] has returned `None`).
+    pub fn mid_frame(&self) -> bool {
+        self.end - self.start >= HEADER_BYTES
+    }
+
     /// The next thing found, or `None` until more bytes are committed.
     pub fn next_event(&mut self) -> Option<Event<'_>> {
         loop {

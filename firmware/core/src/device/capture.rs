@@ -228,6 +228,7 @@ impl<W: Wheel, C: FrameSource, S: CaptureStore> Device<'_, W, C, S> {
         let bound_dn = plan.weights(0).map(|weights| weights.bound_dn()).unwrap_or_default();
         Ok(CaptureDescription {
             id: job.id,
+            boot: self.setup.boot,
             state: CaptureState::Complete,
             sensor: sensor.clone(),
             frames: job.frames.clone(),

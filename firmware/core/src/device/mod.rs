@@ -39,7 +39,7 @@ pub struct Setup {
     pub default_word: Word,
     /// Rows of a strip, a multiple of 16.
     pub strip_rows: u16,
-    /// A number that differs from boot to boot: sessions start from it.
+    /// A number that differs from boot to boot: sessions start from it, and captures carry it.
     pub boot: u32,
     /// The first capture gets this name; above all that the store holds.
     pub first_capture: CaptureId,

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use host_fit::Statistics;
 use host_image::StokesImage;
+use host_link::LinkError;
 use host_link::replay::{ReplayReport, replay};
 use protocol_polar::Flags;
 use serde_json::{Value, json};
@@ -72,7 +73,13 @@ pub(crate) fn deliver(
     // All is on this side under its final name: now the camera may forget it.
     let mut released = false;
     if !delivery.keep {
-        match opened.client.release(received.description.id) {
+        // Not one of the same name that the camera has taken after a restart.
+        let id = received.description.id;
+        let same = opened
+            .client
+            .describe(id)
+            .and_then(|held| if held == received.description { Ok(()) } else { Err(LinkError::OtherCapture { id }) });
+        match same.and_then(|()| opened.client.release(id)) {
             Ok(()) => released = true,
             Err(error) => terminal.warn(format!(
                 "the files are complete, but the camera still holds capture {}: {error}",
@@ -171,13 +178,22 @@ fn facts(
         (
             "fixed point",
             format!(
-                "{bits} bits, {} of them fractional; proved error at most {b0:.3}, {b1:.3}, {b2:.3} DN",
-                d.frac_bits
+                "{bits} bits, {} of them fractional; proved error at most {b0:.3}, {b1:.3}, {b2:.3} DN where no sample was \
+                 dropped{}",
+                d.frac_bits,
+                if d.calibration.flat_map { ", times the flat gain" } else { "" }
             ),
         ),
         ("saturated", percent(Flags::SATURATED)),
         ("without a value", percent(Flags::TOO_FEW)),
-        ("misfit", percent(Flags::MISFIT)),
+        (
+            "misfit",
+            if d.frames.len() > 3 {
+                percent(Flags::MISFIT)
+            } else {
+                "not seen with three frames; four or more show it".into()
+            },
+        ),
         ("mean s0", format!("{:.1} DN", statistics.mean_s0)),
         ("mean DoLP", format!("{:.4}", statistics.mean_dolp)),
         (
@@ -232,6 +248,11 @@ fn json(
         "word_bits": if d.word == protocol_wire::Word::I16 { 16 } else { 32 },
         "frac_bits": d.frac_bits,
         "bound_dn": d.bound_dn,
+        "black_level_dn": d.sensor.black_level_dn,
+        "white_level_dn": d.sensor.white_level_dn,
+        "efficiency": d.frames.iter().map(|frame| frame.efficiency).collect::<Vec<_>>(),
+        "dark_map": d.calibration.dark_map,
+        "flat_map": d.calibration.flat_map,
         "mean_s0_dn": statistics.mean_s0,
         "mean_dolp": statistics.mean_dolp,
         "percent": flags,

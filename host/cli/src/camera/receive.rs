@@ -15,6 +15,9 @@ use crate::terminal::Terminal;
 /// How long to try to reach a camera again that was lost in mid-transfer.
 const RETURN: Duration = Duration::from_secs(20);
 
+/// How often the link may break before a single strip has come.
+const IN_VAIN: u32 = 5;
+
 /// A capture on this side, every strip verified.
 pub(crate) struct Received {
     pub(crate) description: CaptureDescription,
@@ -53,17 +56,31 @@ pub(crate) fn receive(opened: &mut Opened, id: CaptureId, raw: bool, terminal: &
     }
     let strips: usize = buffers.iter().map(|buffer| usize::from(buffer.missing())).sum();
     let progress = terminal.progress(strips, "fetching");
+    let serial = opened.client.identity().serial.clone();
     let mut reconnects = 0;
+    let mut in_vain = 0;
     loop {
+        let before: u32 = buffers.iter().map(|buffer| u32::from(buffer.missing())).sum();
         match fetch_missing(opened, &description, &mut buffers, |done| progress.set_position(done as u64)) {
             Ok(()) => break,
             Err(LinkError::Gone) => {
+                let after: u32 = buffers.iter().map(|buffer| u32::from(buffer.missing())).sum();
+                in_vain = if after < before { 0 } else { in_vain + 1 };
+                if in_vain == IN_VAIN {
+                    return Err(link_failure(&LinkError::Gone, &name)
+                        .map_text(|text| format!("{text}, {IN_VAIN} times in a row before a single strip had come")));
+                }
                 progress.set_message("waiting");
                 return_to(opened, &name)?;
+                // It may be another camera, or one that was restarted and has taken another capture since.
+                let again = opened.client.describe(id).map_err(|error| link_failure(&error, &name))?;
+                if opened.client.identity().serial != serial || again != description {
+                    return Err(link_failure(&LinkError::OtherCapture { id }, &name));
+                }
                 progress.set_message("fetching");
                 reconnects += 1;
             }
-            Err(error) => return Err(link_failure(&error, &name)),
+            Err(error) => return Err(bad_line(&error, opened, &name)),
         }
     }
     progress.finish_and_clear();
@@ -73,6 +90,22 @@ pub(crate) fn receive(opened: &mut Opened, id: CaptureId, raw: bool, terminal: &
         .collect::<HashMap<_, _>>();
     let bytes = planes.values().map(Vec::len).sum();
     Ok(Received { description, planes, bytes, seconds: begun.elapsed().as_secs_f64(), reconnects })
+}
+
+/// A failure on a line that damages what it carries is the line's.
+fn bad_line(error: &LinkError, opened: &Opened, name: &str) -> Failure {
+    let counters = opened.client.counters();
+    if !matches!(error, LinkError::Timeout { .. }) || counters.damaged + counters.skipped_bytes == 0 {
+        return link_failure(error, name);
+    }
+    Failure::new(
+        Exit::Device,
+        format!(
+            "{name}: the line damages data: {} frames damaged, {} bytes of no frame",
+            counters.damaged, counters.skipped_bytes
+        ),
+        "Try another cable or port. The capture is still on the camera: `brewster fetch` gets it.",
+    )
 }
 
 fn fetch_missing(

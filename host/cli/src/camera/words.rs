@@ -15,9 +15,16 @@ pub(crate) fn link_failure(error: &LinkError, camera: &str) -> Failure {
             "Check the cable and the power. What the camera has taken it keeps: `brewster fetch` gets it when the camera is \
              back.",
         ),
+        LinkError::Timeout { waiting_for: "identity" } => device(
+            "Another program may have the camera (it serves one host at a time), or something else answers there. Check that \
+             it is a brewster camera and try again; captures it has taken are kept (`brewster fetch`).",
+        ),
+        LinkError::Usb(_) => {
+            device("USB cannot be used on this machine as it is. Without a camera: --device emulated.")
+        }
         LinkError::Timeout { .. } => device(
-            "The camera may be busy with a long exposure, or something else answers there. Check that it is a brewster \
-             camera and try again; captures it has taken are kept (`brewster fetch`).",
+            "The camera may be busy with a long exposure, or the line loses data. Try again; captures it has taken are kept \
+             (`brewster fetch`).",
         ),
         LinkError::Version { theirs, ours } => device(if theirs > ours {
             "Update this program: the camera's firmware is newer."
@@ -91,7 +98,9 @@ fn refused(refusal: &Refusal) -> Failure {
                 "Spread the angles over 180 degrees: 0, 60, 120 is the best set of three.",
             );
         }
-        Refusal::OutOfRange(name) => (format!("the camera cannot do this: {name}"), "See `brewster capture --help`."),
+        Refusal::OutOfRange(name) => {
+            (format!("out of this camera's range: {name}"), "`brewster capture --help` says what can be asked for.")
+        }
         Refusal::WordTooNarrow => (
             "16-bit planes cannot hold this sensor's samples".into(),
             "Use --word i32: sensors of more than 14 bits need it.",
@@ -125,9 +134,10 @@ fn refused(refusal: &Refusal) -> Failure {
         Refusal::BadCalibration(what) => {
             (format!("the calibration picture cannot be used: {what}"), "Mend that and repeat.")
         }
-        Refusal::StorageFailed(what) => {
-            (format!("the camera's storage fails: {what}"), "Check its card and free space.")
-        }
+        Refusal::StorageFailed(what) => (
+            format!("the camera's storage fails: {what}"),
+            "Fetch what it holds (`brewster fetch`); check its card and free space.",
+        ),
         Refusal::Cancelled => ("the capture was cancelled".into(), "Nothing of it is kept."),
     };
     Failure::new(Exit::Refused, what, advice)

@@ -22,7 +22,7 @@ pub(crate) struct Capture {
     #[command(flatten)]
     device: DeviceArgs,
     /// Polarizer angles, degrees counter-clockwise from horizontal; repeat one to average [default: the camera's own set]
-    #[arg(long, value_name = "DEG,DEG,...", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(long, value_name = "DEG,DEG,...", value_delimiter = ',', allow_hyphen_values = true, value_parser = axis)]
     angles: Option<Vec<f64>>,
     /// Exposure of each frame in ms, or auto: metered at every angle, locked so that none clips
     #[arg(long, value_name = "MS|auto", default_value = "auto", value_parser = exposure)]
@@ -112,6 +112,11 @@ pub(crate) fn take(opened: &mut Opened, request: CaptureRequest, terminal: &Term
     progress.finish_and_clear();
     opened.tell_warnings(terminal);
     result.map_err(|error| link_failure(&error, &name))
+}
+
+fn axis(text: &str) -> Result<f64, String> {
+    let angle = text.trim().parse().ok().filter(|angle: &f64| angle.abs() <= 3600.0);
+    angle.ok_or_else(|| "expected an angle in degrees, -3600 to 3600".to_owned())
 }
 
 fn exposure(text: &str) -> Result<Exposure, String> {

@@ -159,7 +159,7 @@ fn stokes_lines(image: &StokesImage) -> Lines {
             m.fixed_point.map(|f| {
                 let [a, b, c] = f.error_bound_dn;
                 format!(
-                    "{} bits, {} of them fractional; error at most {a:.3}, {b:.3}, {c:.3} DN",
+                    "{} bits, {} of them fractional; error at most {a:.3}, {b:.3}, {c:.3} DN where no sample was dropped",
                     f.word_bits, f.fractional_bits
                 )
             }),

@@ -79,7 +79,7 @@ fn a_set_that_determines_nothing_is_refused_before_anything_is_made() {
         );
     }
     w.refused(&["capture", "-d", "emulated", "--angles", "10,10.5,11"], NOT_IDENTIFIABLE, &["close together"]);
-    w.refused(&["capture", "-d", "emulated", "--angles", "0,60,nan"], REFUSED, &["angle_deg"]);
+    w.refused(&["capture", "-d", "emulated", "--angles", "0,60,nan"], USAGE, &["nan", "degrees"]);
 }
 
 #[test]

@@ -113,7 +113,11 @@ impl<T: Transport> Client<T> {
             if granted < count && ahead <= window / 2 {
                 let credit = (window - ahead).min(count - granted);
                 granted += credit;
-                line.send_as(sequence, &FromHost::Grant(Grant { credit }))?;
+                match line.send_as(sequence, &FromHost::Grant(Grant { credit })) {
+                    // What came before the camera left is still to be read; the next read past it says so again.
+                    Ok(()) | Err(LinkError::Gone) => {}
+                    Err(error) => return Err(error),
+                }
             }
         }
         Ok(run.end)

@@ -6,12 +6,15 @@ use protocol_wire::{
     Deframer, Event, FromDevice, FromHost, HEADER_BYTES, Header, Log, MAX_PAYLOAD, Name, Refusal, Refused, StripHeader,
     VERSION,
 };
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// A message to the camera is at most a request for a capture of all frames.
 const LARGEST_REQUEST: usize = 1024;
 /// Room behind the largest frame, so that a read at its end is not short.
 const READ_AHEAD: usize = 64 * 1024;
+
+/// Longest time that one frame may take beyond the limit, while its bytes come in: the largest at 10 kB/s.
+const FRAME_PATIENCE: Duration = Duration::from_secs(60);
 
 type LogReader = Box<dyn FnMut(&Log) + Send>;
 
@@ -75,13 +78,14 @@ impl<T: Transport> Line<T> {
         self.transport.write_all(frame, self.options.reply)
     }
 
-    /// The next frame of this session, or silence at `limit`. Log lines go to their reader.
+    /// The next frame of this session, or silence: nothing until `limit`, and no frame under way. Log lines go to their reader.
     ///
     /// # Errors
     /// The transport's; [`LinkError::Version`]; [`LinkError::Malformed`] for a frame of this session that is not what its
     /// key says.
-    pub(super) fn receive(&mut self, limit: Instant) -> Result<Incoming, LinkError> {
+    pub(super) fn receive(&mut self, mut limit: Instant) -> Result<Incoming, LinkError> {
         let mut heard = None;
+        let end = limit + FRAME_PATIENCE;
         loop {
             let session = self.session;
             match self.deframer.next_event() {
@@ -138,6 +142,10 @@ impl<T: Transport> Line<T> {
                     self.deframer.commit(n);
                     if n > 0 {
                         heard = Some(Instant::now());
+                        // A slow line is not a silent one: a frame that is on its way gets the time it takes.
+                        if self.deframer.mid_frame() {
+                            limit = limit.max(Instant::now() + self.options.reply).min(end);
+                        }
                     }
                 }
             }

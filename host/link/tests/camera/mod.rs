@@ -137,6 +137,7 @@ pub(crate) fn camera(width: u32, height: u32, rows: u16) -> Camera {
         planes: infos.iter().map(bytes).collect(),
         description: CaptureDescription {
             id: HELD,
+            boot: 1,
             state: CaptureState::Complete,
             sensor,
             frames: [].into_iter().collect(),

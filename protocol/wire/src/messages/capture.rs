@@ -202,6 +202,8 @@ pub struct CaptureSummary {
 pub struct CaptureDescription {
     /// Its name.
     pub id: CaptureId,
+    /// Which start of the camera it was taken in: names may come again after one, this number does not.
+    pub boot: u32,
     /// How far it is.
     pub state: CaptureState,
     /// The sensor it was taken with.

@@ -93,6 +93,7 @@ pub(crate) fn from_device() -> std::vec::Vec<FromDevice> {
 pub(crate) fn description() -> CaptureDescription {
     CaptureDescription {
         id: CaptureId(190_000),
+        boot: 0xB007_1234,
         state: CaptureState::Complete,
         sensor: sensor(),
         frames: list([
