@@ -8,10 +8,13 @@ mod licenses;
 mod metadata;
 mod no_std;
 mod numerics;
+mod oracles;
 mod perf;
 mod process;
+mod ulp;
 
 use clap::{Parser, Subcommand};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -23,7 +26,7 @@ struct Arguments {
     step: Option<Step>,
 }
 
-#[derive(Clone, Copy, Subcommand)]
+#[derive(Clone, Subcommand)]
 enum Step {
     /// Formatting, as rustfmt.toml says
     Fmt {
@@ -43,6 +46,20 @@ enum Step {
         #[arg(long)]
         write: bool,
     },
+    /// Independent reference values in a folder against the code
+    Oracles {
+        /// Folder with JSON tables [default: oracles in $BREWSTER_SHARED, or in ../shared beside the workspace]
+        folder: Option<PathBuf>,
+        /// Also fail on tables of an unknown family
+        #[arg(long)]
+        strict: bool,
+    },
+    /// Worst errors of the optics' functions in units in the last place, against arbitrary precision
+    Ulp {
+        /// Write the table into docs/NUMERICS.md
+        #[arg(long)]
+        write: bool,
+    },
     /// Dependency arrows between the crates of this workspace
     Arrows,
     /// Licenses of all dependencies, stricter on the device's side
@@ -58,13 +75,15 @@ impl Step {
     const SAFE_TO_PUSH: [Self; 7] =
         [Self::Fmt { write: false }, Self::Arrows, Self::Licenses, Self::Docs, Self::Lint, Self::NoStd, Self::Test];
 
-    fn name(self) -> &'static str {
+    fn name(&self) -> &'static str {
         match self {
             Self::Fmt { .. } => "fmt",
             Self::Lint => "lint",
             Self::Test => "test",
             Self::Docs => "docs",
             Self::Numerics { .. } => "numerics",
+            Self::Oracles { .. } => "oracles",
+            Self::Ulp { .. } => "ulp",
             Self::Arrows => "arrows",
             Self::Licenses => "licenses",
             Self::NoStd => "no-std",
@@ -72,14 +91,16 @@ impl Step {
         }
     }
 
-    fn run(self) -> anyhow::Result<String> {
+    fn run(&self) -> anyhow::Result<String> {
         match self {
             Self::Fmt { write: false } => process::cargo(&["fmt", "--all", "--check"]),
             Self::Fmt { write: true } => process::cargo(&["fmt", "--all"]),
             Self::Lint => process::cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]),
             Self::Test => process::cargo(&["test", "--workspace"]),
             Self::Docs => docs::check(),
-            Self::Numerics { write } => numerics::run(write),
+            Self::Numerics { write } => numerics::run(*write),
+            Self::Oracles { folder, strict } => oracles::run(folder.as_deref(), *strict),
+            Self::Ulp { write } => ulp::run(*write),
             Self::Arrows => arrows::check(),
             Self::Licenses => licenses::check(),
             Self::NoStd => no_std::check(),

@@ -76,6 +76,8 @@ struct Solver {
     least_squares: LeastSquares,
     /// Indices of the frames in use, in order.
     kept: Vec<usize>,
+    /// max_k |w_jk| of each row of W.
+    largest: [f64; 3],
 }
 
 impl StokesEstimator {
@@ -118,7 +120,8 @@ impl StokesEstimator {
     ///
     /// `dropped` has bit k set where frame k is not to be used. `variances` are those of the signals; with them the
     /// covariance is W diag(variances) Wᵀ of the linear estimate W (exact for any weights), and a residual beyond what
-    /// they allow is flagged `MISFIT`. The flag `SATURATED` says that a frame was dropped.
+    /// they allow is flagged `MISFIT`. The flag `SATURATED` says that a frame was dropped. A component that is no more than
+    /// rounding is 0.
     #[must_use]
     pub fn estimate(&self, signals: &[f64], variances: Option<&[f64]>, dropped: u16) -> StokesEstimate {
         let mut flags = if dropped == 0 { Flags::default() } else { Flags::SATURATED };
@@ -142,7 +145,7 @@ impl StokesEstimator {
             picked = pick(signals);
             &picked[..n]
         };
-        let stokes = solver.least_squares.solve(used);
+        let stokes = solver.without_rounding(solver.least_squares.solve(used), used);
         let freedom = (n - 3) as f64;
         let mean_square = if n > 3 { solver.least_squares.chi2(used) / freedom } else { 0.0 };
         let covariance = variances.map(|variances| {
@@ -184,11 +187,28 @@ impl StokesEstimator {
         if least_squares.condition() > self.options.condition_limit {
             return Err(not_identifiable(least_squares.condition()));
         }
-        Ok(Solver { least_squares, kept })
+        let largest = least_squares.weights().map(|row| row.iter().map(|w| w.abs()).fold(0.0, f64::max));
+        Ok(Solver { least_squares, kept, largest })
     }
 }
 
+/// A component s_j = Σ w_jk x_k is 0 where |s_j| is at most this times max_k |w_jk| Σ |x_k|: 4 ε is the rounding of the
+/// products, of their sum and of the weights (a weight that should be 0 is some ε of the largest of its row). Nothing
+/// measured is that small, and light that cancels exactly is exactly none.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
 impl Solver {
+    /// `stokes`, which is W `signals`, without what is rounding alone: see [`ROUNDING`].
+    fn without_rounding(&self, mut stokes: [f64; 3], signals: &[f64]) -> [f64; 3] {
+        let total: f64 = signals.iter().map(|x| x.abs()).sum();
+        for (s, largest) in stokes.iter_mut().zip(self.largest) {
+            if s.abs() <= ROUNDING * largest * total {
+                *s = 0.0;
+            }
+        }
+        stokes
+    }
+
     /// W diag(variances) Wᵀ; `variances` of the kept frames.
     fn covariance(&self, variances: &[f64]) -> [[f64; 3]; 3] {
         let weights = self.least_squares.weights();

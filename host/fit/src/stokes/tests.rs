@@ -61,6 +61,38 @@ fn darkness_is_dark_and_what_lies_below_black_keeps_its_sign() {
     assert_eq!(below.residual, None);
 }
 
+/// Signals of whole numbers that cancel leave no light, not 2e-16 of it (of which a DoLP of 1e16 would be made); and what
+/// does not cancel stays.
+#[test]
+fn what_cancels_exactly_is_exactly_zero() {
+    let solved = |degrees: &[f64], signals: &[f64]| {
+        let estimator = StokesEstimator::new(&ideal(degrees), EstimatorOptions::default()).unwrap();
+        estimator.estimate(signals, None, 0).stokes
+    };
+    let three = StokesEstimator::new(&ideal(&[0.0, 45.0, 90.0]), EstimatorOptions::default()).unwrap();
+    let none = pixel(&three, &[256.0; 3], 256.0);
+    assert_eq!((none.s0[0], none.s1[0], none.s2[0]), (0.0, 0.0, 0.0));
+    // Of 0, 45, 90: s0 = a + c, s1 = a - c, s2 = 2b - a - c.
+    for a in -40..=40_i32 {
+        for (b, c) in [(-3, -a), (0, -a), (a, a), (7, a), (11, 3 - a)] {
+            let found = solved(&[0.0, 45.0, 90.0], &[a, b, c].map(f64::from));
+            for (found, exact) in found.into_iter().zip([a + c, a - c, 2 * b - a - c].map(f64::from)) {
+                let zero = found.abs() < f64::MIN_POSITIVE;
+                assert!(
+                    zero == (exact.abs() < 0.5) && (found - exact).abs() < 1e-13,
+                    "{a} {b} {c}: {found} for {exact}"
+                );
+            }
+        }
+    }
+    // Of 0, 60, 120: s0 = 2(a + b + c)/3, and s2 = 4 (b - c)/(2 sqrt 3).
+    let [s0, _, s2] = solved(&[0.0, 60.0, 120.0], &[2.0, -1.0, -1.0]);
+    assert_eq!((s0.to_bits(), s2.to_bits()), (0, 0));
+    let found = pixel(&three, &[257.0, 256.0, 255.0], 256.0);
+    let statistics = crate::Statistics::gather([&found.s0, &found.s1, &found.s2], None, None);
+    assert_eq!((statistics.no_light, statistics.above_one), (1, 0));
+}
+
 #[test]
 fn results_beyond_f32_are_clamped_and_flagged() {
     let estimator = StokesEstimator::new(&ideal(&[0.0, 45.0, 90.0]), EstimatorOptions::default()).unwrap();
