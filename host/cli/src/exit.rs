@@ -9,7 +9,7 @@ pub(crate) enum Exit {
     Usage,
     /// A file that was given is missing, damaged, of the wrong kind, or does not fit the others.
     BadInput,
-    /// The results cannot be written.
+    /// The results cannot be written, or not be printed.
     Output,
     /// No camera, or the link to it broke.
     Device,
@@ -17,11 +17,24 @@ pub(crate) enum Exit {
     Refused,
     /// The pictures are sound, but do not determine what was asked for.
     NotIdentifiable,
+    /// Ctrl-C (SIGINT). 128 plus the number of the signal, as shells have it.
+    Interrupted,
+    /// `kill` (SIGTERM).
+    Terminated,
 }
 
 impl Exit {
-    const ALL: [Self; 7] =
-        [Self::Ok, Self::Usage, Self::BadInput, Self::Output, Self::Device, Self::Refused, Self::NotIdentifiable];
+    const ALL: [Self; 9] = [
+        Self::Ok,
+        Self::Usage,
+        Self::BadInput,
+        Self::Output,
+        Self::Device,
+        Self::Refused,
+        Self::NotIdentifiable,
+        Self::Interrupted,
+        Self::Terminated,
+    ];
 
     /// The number the shell sees. 1 is left to what was never meant to happen (a panic is 101).
     pub(crate) const fn code(self) -> u8 {
@@ -33,6 +46,8 @@ impl Exit {
             Self::Device => 5,
             Self::Refused => 6,
             Self::NotIdentifiable => 7,
+            Self::Interrupted => 130,
+            Self::Terminated => 143,
         }
     }
 
@@ -46,6 +61,8 @@ impl Exit {
             Self::Device => "device",
             Self::Refused => "refused",
             Self::NotIdentifiable => "not_identifiable",
+            Self::Interrupted => "interrupted",
+            Self::Terminated => "terminated",
         }
     }
 
@@ -54,16 +71,18 @@ impl Exit {
             Self::Ok => "all done",
             Self::Usage => "the command line makes no sense",
             Self::BadInput => "a file is missing, damaged, of the wrong kind, or does not fit the others",
-            Self::Output => "the results cannot be written",
+            Self::Output => "the results cannot be written or printed",
             Self::Device => "no camera, or the link to it broke",
             Self::Refused => "the camera refused",
             Self::NotIdentifiable => "not identifiable: the pictures do not determine the answer",
+            Self::Interrupted => "stopped by Ctrl-C (SIGINT); unfinished results were removed",
+            Self::Terminated => "stopped by SIGTERM; unfinished results were removed",
         }
     }
 
     /// The table for `--help`.
     pub(crate) fn help() -> String {
-        let lines = Self::ALL.map(|e| format!("  {}  {:<17} {}\n", e.code(), e.kind(), e.meaning()));
+        let lines = Self::ALL.map(|e| format!("{:>5}  {:<17} {}\n", e.code(), e.kind(), e.meaning()));
         format!("Exit codes:\n{}", lines.concat())
     }
 }

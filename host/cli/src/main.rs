@@ -17,7 +17,8 @@ use clap::Parser;
 use crate::commands::Command;
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::terminal::Terminal;
+use crate::output::signals;
+use crate::terminal::{Terminal, heard};
 
 /// Stokes images: intensity, degree and angle of linear polarization of every pixel.
 #[derive(Parser)]
@@ -39,11 +40,11 @@ fn main() -> ExitCode {
         Err(error) => return refuse(&error),
     };
     let terminal = Terminal::new(cli.quiet, cli.json);
-    let exit = match cli.command.run(&terminal) {
-        Ok(outcome) => {
-            terminal.finish(&outcome);
-            Exit::Ok
-        }
+    signals::watch(cli.json);
+    let result = cli.command.run(&terminal);
+    signals::stand_back();
+    let exit = match result.and_then(|outcome| terminal.finish(&outcome)) {
+        Ok(()) => Exit::Ok,
         Err(failure) => {
             terminal.fail(&failure);
             failure.exit
@@ -55,13 +56,21 @@ fn main() -> ExitCode {
 /// A command line that was not understood, or a question about it (`--help`, `--version`).
 fn refuse(error: &clap::Error) -> ExitCode {
     // The flag was not parsed, as nothing was; programs still want their JSON.
-    if error.use_stderr() && std::env::args_os().any(|a| a == "--json") {
+    let json = std::env::args_os().any(|a| a == "--json");
+    if error.use_stderr() && json {
         let text = error.render().to_string();
         let what = text.trim().strip_prefix("error: ").unwrap_or(text.trim());
         Terminal::new(false, true).fail(&Failure::new(Exit::Usage, what, "See brewster --help."));
         return ExitCode::from(Exit::Usage.code());
     }
-    // Nothing is left to tell it to if the terminal has gone away.
-    let _ = error.print();
-    ExitCode::from(if error.use_stderr() { Exit::Usage } else { Exit::Ok }.code())
+    let exit = match heard(error.print()) {
+        _ if error.use_stderr() => Exit::Usage,
+        Ok(()) => Exit::Ok,
+        Err(e) => {
+            let failure = Failure::new(Exit::Output, format!("cannot print this: {e}"), "Check where the output goes.");
+            Terminal::new(false, json).fail(&failure);
+            failure.exit
+        }
+    };
+    ExitCode::from(exit.code())
 }

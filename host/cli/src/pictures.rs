@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::exit::Exit;
 use crate::failure::Failure;
-use crate::output::OutputFolder;
+use crate::output::{OutputFolder, write_durably};
 use crate::report::{Figure, Report};
 use crate::terminal::Terminal;
 
@@ -62,7 +62,7 @@ pub(crate) fn write(
 
 /// Writes `report.html`.
 pub(crate) fn write_report(report: &Report, folder: &OutputFolder) -> Result<(), Failure> {
-    std::fs::write(folder.path().join("report.html"), report.to_html()).map_err(|e| unwritable(folder, &e))
+    write_durably(&folder.path().join("report.html"), &report.to_html()).map_err(|e| unwritable(folder, &e))
 }
 
 /// Where everything is, in words: the last lines of a command's text.

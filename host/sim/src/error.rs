@@ -90,6 +90,20 @@ pub enum SimError {
         /// Why.
         source: OpticsError,
     },
+    /// Unsupported: the scene is sound, but holds what is not simulated.
+    #[error("`{key}` is not simulated: {why}")]
+    NotSimulated {
+        /// Dotted key in the scene.
+        key: String,
+        /// What cannot be done.
+        why: String,
+    },
+    /// The physics refused light or surfaces that the scene's own checks let through.
+    #[error(transparent)]
+    Physics(#[from] OpticsError),
+    /// A tolerance that is none.
+    #[error("a tolerance of {0}: expected more than 0 and at most 1, relative to s0")]
+    Tolerance(f64),
     /// There is no view of this number.
     #[error("the scene has {views} views, so there is no view {view} (views count from 0)")]
     NoView {

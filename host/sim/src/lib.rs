@@ -21,8 +21,10 @@ mod rng;
 pub mod scene;
 mod sensor;
 mod signal;
+pub mod simulate;
 
 pub use effect::{Assessment, Effect, EffectSet};
 pub use error::{Place, SimError};
 pub use facts::Facts;
 pub use scene::Scene;
+pub use simulate::simulate;

@@ -7,6 +7,7 @@ mod demo;
 mod devices;
 mod fetch;
 mod info;
+mod simulate;
 mod stokes;
 
 use crate::failure::Failure;
@@ -20,6 +21,7 @@ pub(crate) enum Command {
     Fetch(fetch::Fetch),
     Calibrate(calibrate::Calibrate),
     Stokes(Box<stokes::Stokes>),
+    Simulate(simulate::Simulate),
     Info(info::Info),
     Devices(devices::Devices),
     Completions(completions::Completions),
@@ -34,6 +36,7 @@ impl Command {
             Self::Calibrate(command) => command.run(terminal),
             Self::Devices(command) => command.run(terminal),
             Self::Stokes(command) => command.run(terminal),
+            Self::Simulate(command) => command.run(terminal),
             Self::Info(command) => command.run(),
             Self::Completions(command) => Ok(command.run()),
         }

@@ -22,6 +22,33 @@ fn angles_that_do_not_determine_the_light() {
 }
 
 #[test]
+fn numbers_beyond_all_sense() {
+    let w = World::new();
+    let [a, b, c] = w.three();
+    for (option, value, words) in [
+        ("--angles", "0,45,1e300", &["3600"][..]),
+        ("--angles", "0,45,nan", &["3600"]),
+        ("--black", "inf", &["auto"]),
+        ("--black", "-1e31", &["1e30"]),
+        ("--black", "65536", &["--black 65536", "0 to 65535"]),
+        ("--black", "-1", &["--black -1", "0 to 65535"]),
+        ("--white", "1e300", &["1e30"]),
+        ("--white", "70000", &["--white 70000", "0 to 65535"]),
+        ("--read-noise", "nan", &["1e30"]),
+        ("--read-noise", "1e6", &["--read-noise 1000000", "0 to 65535"]),
+        ("--efficiency", "1e-300", &["efficiency of", "next to no polarizer"]),
+        ("--efficiency", "1e-9", &["efficiency of", "next to no polarizer"]),
+        ("--extinction-ratio", "1.0000000000000002", &["extinction ratio of", "next to no polarizer"]),
+    ] {
+        w.refused(&["stokes", ".", option, value], USAGE, words);
+    }
+    // Poor angles are still the angles' fault.
+    let poor = ["stokes", ".", "--angles", "0,90,180", "--efficiency", "1e-9"];
+    w.refused(&poor, NOT_IDENTIFIABLE, &["2 different"]);
+    w.refused(&["stokes", a, b, c, "./a_045.png", "--angles", "0,45,90,135"], USAGE, &["./a_045.png", "twice"]);
+}
+
+#[test]
 fn names_that_do_not_say_the_angle() {
     let w = World::new();
     for name in ["DSC_0012.png", "DSC_0013.png", "DSC_0014.png"] {

@@ -183,6 +183,24 @@ fn darkness_and_glare_are_results_too() {
 }
 
 #[test]
+fn signals_that_cancel_are_no_light_and_what_no_float_holds_is_told() {
+    let w = World::new();
+    for (angle, dn) in [(0, 257), (45, 256), (90, 255)] {
+        w.grey(&format!("c_{angle}.png"), 2, &[dn; 4]);
+    }
+    let json = w.ok(&["stokes", ".", "--black", "256", "-o", "r", "--json"]).json();
+    assert!(near(json["colors"][0]["no_light_percent"].as_f64().unwrap(), 100.0), "{json}");
+    assert_eq!(w.stokes("r").colors[0].s0, vec![0.0; 4]);
+
+    std::fs::create_dir(w.path("big")).unwrap();
+    for angle in [0, 45, 90] {
+        let frame = picture(2, 1, Samples::F32(vec![3e38; 2]), Encoding::Linear);
+        frame.write_exr(&w.path(&format!("big/e_{angle}.exr"))).unwrap();
+    }
+    assert!(w.ok(&["stokes", "big", "-o", "b"]).stderr.contains("100.0 % of the pixels are beyond"));
+}
+
+#[test]
 fn info_tells_what_a_file_is() {
     let w = World::new();
     w.three();
@@ -204,7 +222,16 @@ fn info_tells_what_a_file_is() {
 fn help_and_completions_say_what_there_is() {
     let w = World::new();
     let help = w.ok(&["--help"]).stdout;
-    for word in ["stokes", "info", "completions", "Exit codes", "not_identifiable", "--json"] {
+    for word in [
+        "stokes",
+        "info",
+        "completions",
+        "Exit codes",
+        "not_identifiable",
+        "130  interrupted",
+        "143  terminated",
+        "--json",
+    ] {
         assert!(help.contains(word), "{word}: {help}");
     }
     assert!(w.ok(&["stokes", "--help"]).stdout.contains("Angles from file names"));

@@ -6,4 +6,5 @@ mod camera;
 mod good_input;
 mod output;
 mod real_data;
+mod simulate;
 mod world;

@@ -1,5 +1,8 @@
 //! Output folders: whole or not at all, and nobody's files are replaced.
 
+#[cfg(unix)]
+mod unix;
+
 use crate::world::World;
 
 const OUTPUT: i32 = 4;
@@ -19,7 +22,7 @@ fn a_folder_that_is_not_empty_is_left_alone() {
     std::fs::write(w.path("mine/thesis.tex"), "three years").unwrap();
     w.refused(&["stokes", ".", "-o", "mine", "--force"], OUTPUT, &["thesis.tex", "did not make"]);
     assert_eq!(std::fs::read(w.path("mine/thesis.tex")).unwrap(), b"three years");
-    w.refused(&["stokes", ".", "-o", ".", "--force"], OUTPUT, &["did not make"]);
+    w.refused(&["stokes", ".", "-o", ".", "--force"], OUTPUT, &["the folder you are in"]);
     assert_eq!(w.names("."), ["a_000.png", "a_045.png", "a_090.png", "mine"]);
 }
 
@@ -63,4 +66,63 @@ fn a_disk_that_fills_up_leaves_no_folder_behind() {
     assert_eq!(run.status.code(), Some(OUTPUT), "{said}");
     assert!(said.contains("result/") && said.contains("free space"), "{said}");
     assert_eq!(w.names("."), before);
+}
+#[test]
+fn force_looks_into_every_folder() {
+    let w = World::new();
+    w.three();
+    let command = ["stokes", ".", "-o", "mine", "--npy", "--force"];
+    let json = w.ok(&[&command[..], &["--json"]].concat()).json();
+    let files: Vec<&str> = json["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap()).collect();
+    assert!(files.contains(&"npy/S0.Y.npy") && files.contains(&"brewster.json"), "{files:?}");
+    w.ok(&command);
+
+    for foreign in ["npy/thesis.tex", "npy/deep/thesis.tex", "chapter/1.tex"] {
+        let path = w.path("mine").join(foreign);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, "three years").unwrap();
+        w.refused(&command, OUTPUT, &[foreign, "did not make"]);
+        assert_eq!(std::fs::read(&path).unwrap(), b"three years");
+        std::fs::remove_file(&path).unwrap();
+        if path.parent().unwrap() != w.path("mine/npy") {
+            w.refused(&command, OUTPUT, &["did not make"]);
+            std::fs::remove_dir(path.parent().unwrap()).unwrap();
+        }
+    }
+    // What the user took out is not missed.
+    w.names("mine/npy").iter().for_each(|name| std::fs::remove_file(w.path("mine/npy").join(name)).unwrap());
+    w.ok(&command);
+}
+
+#[test]
+fn folders_that_are_no_place_for_results() {
+    let w = World::new();
+    w.three();
+    std::fs::create_dir(w.path("empty")).unwrap();
+    for place in [".", "./", "empty/..", "..", "/"] {
+        for force in [&[][..], &["--force"]] {
+            let arguments = [&["stokes", ".", "-o", place], force].concat();
+            w.refused(&arguments, OUTPUT, &["the folder you are in", "-o result"]);
+        }
+    }
+    w.refused(&["stokes", ".", "-o", "nowhere/.."], OUTPUT, &["not the name"]);
+    w.ok(&["stokes", ".", "-o", "empty"]);
+}
+
+#[test]
+fn many_at_once_get_a_folder_each() {
+    let w = World::new();
+    w.three();
+    let runs: Vec<_> = std::thread::scope(|scope| {
+        let started: Vec<_> = (0..6).map(|_| scope.spawn(|| w.ok(&["stokes", ".", "--json"]).json())).collect();
+        started.into_iter().map(|run| run.join().unwrap()).collect()
+    });
+    let mut outputs: Vec<&str> = runs.iter().map(|json| json["output"].as_str().unwrap()).collect();
+    for (json, output) in runs.iter().zip(&outputs) {
+        let record = std::fs::read(w.path(output).join("brewster.json")).unwrap();
+        assert_eq!(&serde_json::from_slice::<serde_json::Value>(&record).unwrap(), json);
+    }
+    outputs.sort_unstable();
+    outputs.dedup();
+    assert_eq!((outputs.len(), w.names("out").len()), (6, 6), "{outputs:?}");
 }

@@ -4,6 +4,7 @@
 //! row ½ t [1, ε cos 2φ, ε sin 2φ] once per frame; everything per photosite is a list of stages that an effect left out is not on. A
 //! random draw follows seed, view, frame and photosite only.
 
+mod plan;
 mod schedule;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -26,6 +27,7 @@ use crate::sensor::shot::Shot;
 use crate::signal::{Band, Signal, checked, single};
 use crate::{Effect, EffectSet, SimError};
 
+pub use plan::{FramePlan, FrameRow, true_difference};
 pub(crate) use schedule::schedule;
 
 /// One frame of the plan, as commanded.

@@ -4,13 +4,11 @@ use std::path::Path;
 
 use host_image::{Color, ColorPlanes, StokesImage, StokesMetadata};
 use proptest::test_runner::TestCaseError;
-use protocol_polar::{Analyzer, LeastSquares};
 use rand::Rng;
 
-use super::Exposer;
-use crate::facts::counted;
+use super::true_difference;
 use crate::rng::{Draw, Stream};
-use crate::signal::{Signal, single};
+use crate::signal::single;
 use crate::{Assessment, Effect, EffectSet, Facts, Scene};
 
 /// A grey camera without a fault, 20 × 14 photosites.
@@ -63,41 +61,13 @@ pub(crate) fn check_bound(scene: &Scene, effect: Effect) -> Result<(f64, Assessm
     let assessed = effect.assess(&Facts::new(scene, 0, &image).unwrap());
     // Photosites are compared under their own filters, but for the filters themselves.
     let base = if effect == Effect::Bayer { EffectSet::NONE } else { EffectSet::NONE.with(Effect::Bayer) };
-    let with = estimate(&Exposer::new(scene, 0, &image, base.with(effect)).unwrap(), scene);
-    let without = estimate(&Exposer::new(scene, 0, &image, base).unwrap(), scene);
-    let signal = Signal::new(&scene.camera, &image, EffectSet::all());
-    let least: Vec<f32> = signal.bands.iter().map(|band| counted(&band[0])).collect();
-    let mut worst = 0.0_f64;
-    for (index, s0) in signal.photosites()[0].iter().enumerate() {
-        if *s0 >= least[signal.band(index / signal.width, index % signal.width)] {
-            for (a, b) in with[index].iter().zip(without[index]) {
-                worst = worst.max((a - b).abs() / f64::from(*s0));
-            }
-        }
-    }
+    let worst = true_difference(scene, 0, &image, base.with(effect), base).unwrap();
     // Frames are f32: a few parts in 10^7 of the brightest light, relative to the darkest.
     let rounding = 3e-5;
     if worst > assessed.bound * (1.0 + 1e-5) + rounding {
         return Err(TestCaseError::fail(format!("{effect:?} changes Stokes by {worst}, bound {assessed:?}")));
     }
     Ok((worst, assessed))
-}
-
-/// Stokes of every photosite, e/ms.
-fn estimate(exposer: &Exposer<'_>, scene: &Scene) -> Vec<[f64; 3]> {
-    let ideal: Vec<Analyzer> = scene.plan.angles.iter().map(|a| Analyzer::ideal(*a)).collect();
-    let solved = LeastSquares::new(&ideal).unwrap();
-    let camera = &scene.camera;
-    let mut sum = vec![[0.0; 3]; usize::from(camera.width_px) * usize::from(camera.height_px)];
-    for (k, spec) in exposer.frames().iter().enumerate() {
-        let same = exposer.frames().iter().filter(|f| f.angle == spec.angle).count();
-        let scale = camera.gain_e_per_dn / (spec.exposure_ms() * scene.polarizer.throughput() * same as f64);
-        for (sum, dn) in sum.iter_mut().zip(exposer.dn(k)) {
-            let y = (f64::from(dn) - f64::from(camera.black_level_dn)) * scale;
-            sum.iter_mut().zip(solved.weights()).for_each(|(s, w)| *s += w[spec.angle] * y);
-        }
-    }
-    sum
 }
 
 fn metadata() -> StokesMetadata {

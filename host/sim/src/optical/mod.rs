@@ -16,7 +16,7 @@ pub mod effects;
 mod facts;
 mod kernel;
 mod light;
-mod numbers;
+pub(crate) mod numbers;
 mod prefilter;
 mod render;
 mod set;

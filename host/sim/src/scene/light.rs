@@ -14,17 +14,19 @@ use serde::Deserialize;
 use super::locate::At;
 use super::radiance;
 use super::value::{Bands, degrees};
-use crate::SimError;
+use crate::{SimError, optical};
 
-/// Light on the sample; one [`SkyBand`] per color band, each with one disk at most.
+/// Light on the sample; one [`SkyBand`] per color band, and one disk at most.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
     /// R, G, B.
     pub bands: [SkyBand; 3],
+    /// The polarization of the bands in numbers.
+    pub pattern: Option<optical::SkyPattern>,
     /// Direction of the sun, if the scene says where it is.
     pub sun: Option<DVec3>,
-    /// The sun's disk at R, G, B; unpolarized, beside the sky.
-    pub disk: Option<[SunDisk; 3]>,
+    /// The sun's disk; unpolarized, beside the sky.
+    pub disk: Option<optical::Sun>,
 }
 
 /// The sky at one band.
@@ -143,6 +145,19 @@ struct RawDisk {
     angular_radius: Option<Degrees>,
 }
 
+impl TurnedMap {
+    /// The map as it is in the file, in its own azimuth.
+    pub(crate) fn map(&self) -> &StokesMap {
+        &self.map
+    }
+
+    /// A direction of the world in the map's own azimuth.
+    pub(crate) fn to_map(&self, DVec3 { x, y, z }: DVec3) -> DVec3 {
+        let (c, s) = self.turn;
+        DVec3::new(c * x + s * y, c * y - s * x, z)
+    }
+}
+
 impl host_optics::Light for SkyBand {
     fn stokes(&self, direction: DVec3) -> [f64; 3] {
         let [l, ..] = self.radiance.stokes(direction);
@@ -170,9 +185,7 @@ impl host_optics::Light for SkyRadiance {
 impl host_optics::Light for TurnedMap {
     /// The sky frame turns about the vertical with the direction, so (Q, U) stay as they are.
     fn stokes(&self, direction: DVec3) -> [f64; 3] {
-        let (c, s) = self.turn;
-        let DVec3 { x, y, z } = direction;
-        self.map.stokes(DVec3::new(c * x + s * y, c * y - s * x, z))
+        self.map.stokes(self.to_map(direction))
     }
 }
 
@@ -190,21 +203,23 @@ impl RawLight {
         let sun = self.sun.as_ref().map(|sun| sun.check(&at.table("sun"))).transpose()?;
         let placed =
             |key: &str| sun.ok_or_else(|| at.malformed(key, "a place of the sun is needed: table `light.sun`"));
-        let polarization = match (&self.rayleigh, &self.berry) {
-            (None, None) => None,
-            (Some(raw), None) => {
-                let pattern = Rayleigh::new(placed("rayleigh")?, raw.max_dolp);
-                Some(SkyPattern::Rayleigh(at.optics("rayleigh.max_dolp", pattern)?))
+        let (polarization, pattern) = match (&self.rayleigh, &self.berry) {
+            (None, None) => (None, None),
+            (Some(RawRayleigh { max_dolp }), None) => {
+                let (sun, max_dolp) = (placed("rayleigh")?, *max_dolp);
+                let pattern = at.optics("rayleigh.max_dolp", Rayleigh::new(sun, max_dolp))?;
+                (Some(SkyPattern::Rayleigh(pattern)), Some(optical::SkyPattern::Rayleigh { sun, max_dolp }))
             }
-            (None, Some(raw)) => {
-                let pattern = Berry::new(placed("berry")?, raw.splitting_deg.0, raw.max_dolp);
-                Some(SkyPattern::Berry(at.optics("berry", pattern)?))
+            (None, Some(RawBerry { max_dolp, splitting_deg: Degrees(splitting_deg) })) => {
+                let (sun, max_dolp, splitting_deg) = (placed("berry")?, *max_dolp, *splitting_deg);
+                let pattern = at.optics("berry", Berry::new(sun, splitting_deg, max_dolp))?;
+                (Some(SkyPattern::Berry(pattern)), Some(optical::SkyPattern::Berry { sun, splitting_deg, max_dolp }))
             }
             _ => return Err(at.malformed("rayleigh", "at most one of `rayleigh` and `berry` may stand here")),
         };
         let disk = self.sun_disk.as_ref().map(|disk| disk.check(at, placed("sun_disk")?)).transpose()?;
         let bands = self.radiance(at, sun)?.map(|radiance| SkyBand { radiance, polarization });
-        Ok(Light { bands, sun, disk })
+        Ok(Light { bands, pattern, sun, disk })
     }
 
     fn radiance(&self, at: &At<'_>, sun: Option<DVec3>) -> Result<[SkyRadiance; 3], SimError> {
@@ -257,7 +272,7 @@ impl RawSun {
 }
 
 impl RawDisk {
-    fn check(&self, light: &At<'_>, sun: DVec3) -> Result<[SunDisk; 3], SimError> {
+    fn check(&self, light: &At<'_>, sun: DVec3) -> Result<optical::Sun, SimError> {
         let elevation = sun.z.asin().to_degrees();
         light.table("sun").check(elevation > 0.0, "elevation_deg", elevation, || {
             "above 0 while there is a `light.sun_disk`: below the horizon no disk is seen".to_owned()
@@ -270,9 +285,9 @@ impl RawDisk {
                 radius.to_radians().0
             }
         };
-        let [r, g, b] = positive(&at, "radiance", self.radiance)?;
-        let disk = |radiance| at.optics("angular_radius_deg", SunDisk::new(sun, radius, radiance));
-        Ok([disk(r)?, disk(g)?, disk(b)?])
+        let radiance = positive(&at, "radiance", self.radiance)?;
+        at.optics("angular_radius_deg", SunDisk::new(sun, radius, 1.0))?;
+        Ok(optical::Sun { direction: sun, angular_radius_rad: radius, radiance })
     }
 }
 

@@ -121,4 +121,20 @@ impl Scene {
             wheel: raw.wheel,
         })
     }
+
+    /// The same scene on another number of photosites. Lens and width of the sensor stay, so the field of view is the same
+    /// across; pitch and blur in pixels follow. What a photosite holds, and its noise, stay.
+    #[must_use]
+    pub fn resized(mut self, width_px: u16, height_px: u16) -> Self {
+        let (width_px, height_px) = (width_px.max(1), height_px.max(1));
+        let factor = f64::from(width_px) / f64::from(self.camera.width_px);
+        self.camera.pixel_pitch_um /= factor;
+        self.camera.psf_sigma_px *= factor;
+        (self.camera.width_px, self.camera.height_px) = (width_px, height_px);
+        for view in &mut self.views {
+            view.focal_px *= factor;
+            (view.width, view.height) = (usize::from(width_px), usize::from(height_px));
+        }
+        self
+    }
 }

@@ -48,10 +48,22 @@ fn frames(angles_deg: &[f64], efficiency: f64) -> Vec<Frame> {
     angles_deg.iter().map(frame).collect()
 }
 
-/// Whether these angles determine a Stokes vector at all.
-pub(super) fn check_angles(angles_deg: &[f64], efficiency: f64) -> Result<(), Failure> {
-    let checked = StokesEstimator::new(&frames(angles_deg, efficiency), EstimatorOptions::default());
-    checked.map(|_| ()).map_err(|e| Failure::fitting(&e))
+/// Whether these angles determine a Stokes vector at all, and whether this polarizer does.
+pub(super) fn check_angles(angles_deg: &[f64], efficiency: f64, extinction_ratio: Option<f64>) -> Result<(), Failure> {
+    let check = |efficiency| StokesEstimator::new(&frames(angles_deg, efficiency), EstimatorOptions::default());
+    check(1.0).map_err(|e| Failure::fitting(&e))?;
+    // The angles are good: what fails now is the polarizer's fault.
+    check(efficiency).map(|_| ()).map_err(|_| {
+        let given = extinction_ratio.map_or_else(
+            || format!("an efficiency of {efficiency}"),
+            |ratio| format!("an extinction ratio of {ratio} (an efficiency of {efficiency:.3e})"),
+        );
+        Failure::new(
+            Exit::Usage,
+            format!("{given} is next to no polarizer: noise would be multiplied by more than a usable answer allows"),
+            "Check the number; sheet polarizers have an efficiency above 0.9.",
+        )
+    })
 }
 
 pub(super) fn analyze(
@@ -65,6 +77,7 @@ pub(super) fn analyze(
     let photographs = Photographs::load(files, mosaic, command.assume_srgb, terminal, &progress)?;
     progress.finish_and_clear();
 
+    check_levels(command, photographs.sample_type)?;
     let (black, white) = levels(command, &photographs, terminal)?;
     let calibration = photographs.calibration(command.dark.as_deref(), command.flat.as_deref(), black)?;
     let noise = command.read_noise.map(|read_dn| Noise {
@@ -134,6 +147,24 @@ fn fit(
         })
         .collect();
     estimator.image(&samples, width).map_err(|e| Failure::fitting(&e))
+}
+
+/// Levels and noise beyond what an integer sample can hold are for other files than these.
+fn check_levels(command: &Stokes, sample_type: SampleType) -> Result<(), Failure> {
+    let Some(full) = sample_type.full_scale().map(f64::from) else { return Ok(()) };
+    let black = match command.black {
+        Some(Black::Level(level)) => Some(f64::from(level)),
+        _ => None,
+    };
+    let given = [("--black", black), ("--white", command.white), ("--read-noise", command.read_noise)];
+    match given.into_iter().find_map(|(name, value)| Some((name, value.filter(|v| !(0.0..=full).contains(v))?))) {
+        None => Ok(()),
+        Some((name, value)) => Err(Failure::new(
+            Exit::Usage,
+            format!("{name} {value} is outside the range of these samples, 0 to {full}"),
+            "Give it in the DN of the files.",
+        )),
+    }
 }
 
 /// Black and white level, linear, in DN.

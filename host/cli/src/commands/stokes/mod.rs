@@ -28,7 +28,7 @@ pub(crate) struct Stokes {
     #[arg(required = true, value_name = "FILES|DIR")]
     inputs: Vec<PathBuf>,
     /// Polarizer angles in the order of the files, degrees counter-clockwise from horizontal; default: from the names
-    #[arg(long, value_name = "DEG,DEG,...", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    #[arg(long, value_name = "DEG,DEG,...", value_delimiter = ',', allow_hyphen_values = true, value_parser = angle)]
     angles: Option<Vec<f64>>,
     /// One raw frame of a sensor with a polarizer on every photosite, instead of several frames
     #[arg(long, value_name = "SENSOR", conflicts_with = "angles")]
@@ -70,6 +70,9 @@ pub(crate) struct Stokes {
     output: OutputArgs,
 }
 
+/// Levels and noise beyond this (or its reciprocal) are no sensor's; squares of it would leave the range of f32.
+const LEVEL_LIMIT: f64 = 1e30;
+
 /// Sensors whose photosites have polarizers.
 #[derive(Clone, Copy, ValueEnum)]
 enum Mosaic {
@@ -88,9 +91,10 @@ impl Stokes {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<Outcome, Failure> {
         let apart: Vec<&Path> = self.dark.iter().chain(&self.flat).map(PathBuf::as_path).collect();
         let files = photographs::find(&self.inputs, &apart)?;
+        refuse_doubles(&files)?;
         let angles_deg = self.angles_deg(&files)?;
         // What cannot work is said before gigabytes are read.
-        analyze::check_angles(&angles_deg, self.efficiency())?;
+        analyze::check_angles(&angles_deg, self.efficiency(), self.extinction_ratio)?;
         let folder = OutputFolder::prepare(&self.output, &self.name(&files))?;
         let analysis = analyze::analyze(self, &files, &angles_deg, terminal)?;
         results::write(self, &analysis, folder, terminal)
@@ -143,6 +147,16 @@ impl Mosaic {
     }
 }
 
+/// A frame that is there twice would count twice under two angles.
+fn refuse_doubles(files: &[PathBuf]) -> Result<(), Failure> {
+    let real: Vec<_> = files.iter().map(|f| f.canonicalize().ok()).collect();
+    let double = files.iter().enumerate().find(|(k, _)| real[*k].is_some() && real[..*k].contains(&real[*k]));
+    double.map_or(Ok(()), |(_, file)| {
+        let what = format!("{} is given twice", file.display());
+        Err(Failure::new(Exit::Usage, what, "Each frame is a picture of its own: name every file once."))
+    })
+}
+
 /// What all names begin with, without digits and separators at its end.
 fn common_start(names: &[String]) -> Option<String> {
     let first = names.first()?;
@@ -155,16 +169,16 @@ fn number(text: &str, fits: impl Fn(f64) -> bool, wanted: &str) -> Result<f64, S
     text.trim().parse().ok().filter(|v| fits(*v)).ok_or_else(|| format!("expected {wanted}"))
 }
 
-fn finite(text: &str) -> Result<f64, String> {
-    number(text, f64::is_finite, "an angle in degrees")
+fn angle(text: &str) -> Result<f64, String> {
+    number(text, |v| v.abs() <= 3600.0, "an angle in degrees, from -3600 to 3600")
 }
 
 fn positive(text: &str) -> Result<f64, String> {
-    number(text, |v| v > 0.0 && v.is_finite(), "a number above 0")
+    number(text, |v| (LEVEL_LIMIT.recip()..=LEVEL_LIMIT).contains(&v), "a number above 0, of at most 1e30")
 }
 
 fn not_negative(text: &str) -> Result<f64, String> {
-    number(text, |v| v >= 0.0 && v.is_finite(), "a number of at least 0")
+    number(text, |v| (0.0..=LEVEL_LIMIT).contains(&v), "a number from 0 to 1e30")
 }
 
 fn efficiency(text: &str) -> Result<f64, String> {
@@ -179,6 +193,7 @@ fn black(text: &str) -> Result<Black, String> {
     if text.eq_ignore_ascii_case("auto") {
         return Ok(Black::Auto);
     }
-    let level: f32 = text.trim().parse().map_err(|_| "expected a level in DN, or auto".to_owned())?;
-    if level.is_finite() { Ok(Black::Level(level)) } else { Err("expected a finite level in DN, or auto".into()) }
+    let level = number(text, |v| v.abs() <= LEVEL_LIMIT, "a level in DN, from -1e30 to 1e30, or auto")?;
+    #[expect(clippy::cast_possible_truncation, reason = "a level in DN; rounding to f32 as the samples are")]
+    Ok(Black::Level(level as f32))
 }

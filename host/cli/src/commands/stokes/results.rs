@@ -59,6 +59,12 @@ fn warn_of_findings(analysis: &Analysis, terminal: &Terminal) {
             "{too_few:.1} % of the pixels are saturated in so many frames that they have no value: expose less"
         ));
     }
+    let out_of_range = worst(|s| s.count(Flags::OUT_OF_RANGE));
+    if out_of_range > 1.0 {
+        terminal.warn(format!(
+            "{out_of_range:.1} % of the pixels are beyond what a 32-bit float can hold and were clamped: scale the samples down"
+        ));
+    }
     let above_one = worst(|s| s.above_one);
     if above_one > 1.0 {
         terminal.warn(format!(
