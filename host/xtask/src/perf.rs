@@ -111,15 +111,16 @@ fn peer_table(text: &mut String, before: &str, after: &str, peers: &[Peer]) -> R
     writeln!(
         text,
         "`{PEERS}`: four frames of 2448 × 2048 u16 in memory to Stokes, then to DoLP and AoLP as well; one thread; the \
-         programs take turns, median of {} rounds (least to most). brewster's kernel was measured before and after them. It \
-         alone subtracts a dark level, drops saturated samples, and gives flags and a residual; it gives 16-bit planes with a \
-         proved bound, OpenCV and numpy f32, polanalyser f64. The ratio is to brewster at the same job; its ends pair the \
+         programs take turns, median of {} rounds (least to most). brewster's kernel was measured before and after them, \
+         the same in all of the first two jobs: it always subtracts a dark level and gives flags. It alone drops saturated \
+         samples, gives a residual and knows a misfit. It gives 16-bit planes with a proved bound, OpenCV and numpy f32, \
+         polanalyser f64. The ratio is to brewster at the same job; its ends pair the \
          fastest round of one with the slowest of the other. DoLP and AoLP are the integer CORDIC of every photosite; the camera \
          runs it on its preview only, one value for 4 to 256 photosites.\n",
         peers.first().map_or(0, |peer| peer.ms.len())
     )?;
     text.push_str("| program | job | ms | × brewster |\n|---|---|---|---|\n");
-    for (job, spread) in [("Stokes", stokes), ("Stokes, DoLP, AoLP", both)] {
+    for (job, spread) in [("Stokes", stokes), ("Stokes, flags", stokes), ("Stokes, DoLP, AoLP", both)] {
         let Spread { least, median, most } = spread;
         writeln!(text, "| brewster | {job} | {median:.1} ({least:.1} to {most:.1}) | 1 |")?;
         for peer in peers.iter().filter(|peer| peer.job == job) {
