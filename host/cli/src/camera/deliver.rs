@@ -17,18 +17,35 @@ use crate::pictures;
 use crate::report::Report;
 use crate::terminal::{Outcome, Terminal};
 
+/// What a user may say about that.
+#[derive(clap::Args)]
+pub(crate) struct DeliveryArgs {
+    /// Compute every integer anew on this side, from the raw frames, and compare bit for bit
+    #[arg(long)]
+    pub(crate) verify: bool,
+    /// Also write the raw frames
+    #[arg(long)]
+    pub(crate) raw: bool,
+    /// Leave the capture on the camera
+    #[arg(long)]
+    pub(crate) keep: bool,
+}
+
+impl DeliveryArgs {
+    /// Whether the capture must have its raw frames.
+    pub(crate) fn needs_raw(&self) -> bool {
+        self.verify || self.raw
+    }
+}
+
 /// What to do with a fetched capture.
 pub(crate) struct Delivery<'a> {
     /// The command, for the record.
     pub(crate) command: &'static str,
     /// Title and first sentence of the report.
     pub(crate) title: (&'a str, &'a str),
-    /// Recompute every integer from the raw frames and compare.
-    pub(crate) verify: bool,
-    /// Write the raw frames.
-    pub(crate) raw: bool,
-    /// Leave the capture on the camera.
-    pub(crate) keep: bool,
+    /// The user's wishes.
+    pub(crate) args: &'a DeliveryArgs,
     /// Further facts: what is printed and stands in the report, and in JSON under `extra`.
     pub(crate) extra: Option<Extra<'a>>,
 }
@@ -46,12 +63,12 @@ pub(crate) fn deliver(
 ) -> Result<Outcome, Failure> {
     let identity = opened.client.identity().clone();
     let image = received.image(&identity.serial, &format!("{}, sensor {}", identity.board, identity.sensor.model));
-    let verdict = delivery.verify.then(|| verify(received)).transpose()?;
+    let verdict = delivery.args.verify.then(|| verify(received)).transpose()?;
     let statistics = statistics(&image);
     warn_of_findings(&statistics, terminal);
 
     let figures = pictures::write(&image, &folder, None, terminal)?;
-    if delivery.raw {
+    if delivery.args.raw {
         write_raw(received, &folder)?;
     }
     let mut facts = facts(received, &identity, &statistics, verdict.as_ref());
@@ -72,7 +89,7 @@ pub(crate) fn deliver(
 
     // All is on this side under its final name: now the camera may forget it.
     let mut released = false;
-    if !delivery.keep {
+    if !delivery.args.keep {
         // Not one of the same name that the camera has taken after a restart.
         let id = received.description.id;
         let same = opened
@@ -93,7 +110,7 @@ pub(crate) fn deliver(
     let output = json.get("output").and_then(Value::as_str).unwrap_or_default().to_owned();
     let mut text: String = facts.iter().map(|(name, value)| format!("{name:<20} {value}\n")).collect();
     text.push_str(&pictures::places(&output, image.colors.iter().any(|c| c.residual.is_some())));
-    if delivery.raw {
+    if delivery.args.raw {
         text.push_str(&format!("  {:<40} the frames the sensor gave\n", Path::new(&output).join("raw").display()));
     }
     Ok(Outcome { text, brief: format!("{output}\n"), json })

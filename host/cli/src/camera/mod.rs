@@ -6,7 +6,7 @@ mod device;
 mod receive;
 mod words;
 
-pub(crate) use deliver::{Delivery, deliver};
+pub(crate) use deliver::{Delivery, DeliveryArgs, deliver};
 pub(crate) use device::{DeviceArgs, Opened};
 pub(crate) use receive::{Received, receive};
 pub(crate) use words::link_failure;

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use protocol_polar::MAX_FRAMES;
 use protocol_wire::{CaptureId, CaptureRequest, Exposure, FrameRequest, Stage, Word};
 
-use crate::camera::{Delivery, DeviceArgs, Opened, deliver, link_failure, receive};
+use crate::camera::{Delivery, DeliveryArgs, DeviceArgs, Opened, deliver, link_failure, receive};
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::output::{OutputArgs, OutputFolder};
@@ -30,15 +30,8 @@ pub(crate) struct Capture {
     /// Word of the Stokes planes: 16 bits are half the bytes, 32 bits round far below any noise [default: the camera's own]
     #[arg(long)]
     word: Option<WordArg>,
-    /// Also fetch the raw frames, compute every integer anew on this side and compare bit for bit
-    #[arg(long)]
-    verify: bool,
-    /// Also write the raw frames
-    #[arg(long)]
-    raw: bool,
-    /// Leave the capture on the camera
-    #[arg(long)]
-    keep: bool,
+    #[command(flatten)]
+    delivery: DeliveryArgs,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -62,9 +55,7 @@ impl Capture {
         let delivery = Delivery {
             command: "capture",
             title: (&title, "Intensity, degree and angle of linear polarization, computed in the camera."),
-            verify: self.verify,
-            raw: self.raw,
-            keep: self.keep,
+            args: &self.delivery,
             extra: None,
         };
         deliver(&mut opened, &received, folder, &delivery, terminal)
@@ -88,7 +79,7 @@ impl Capture {
             Some(WordArg::I16) => Word::I16,
             Some(WordArg::I32) => Word::I32,
         };
-        Ok(CaptureRequest { frames, exposure: self.exposure, word, keep_raw: self.verify || self.raw })
+        Ok(CaptureRequest { frames, exposure: self.exposure, word, keep_raw: self.delivery.needs_raw() })
     }
 }
 

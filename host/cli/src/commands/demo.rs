@@ -8,7 +8,7 @@ use protocol_wire::{CaptureRequest, Exposure};
 use serde_json::{Value, json};
 
 use super::capture::take;
-use crate::camera::{Delivery, DeviceArgs, deliver, receive};
+use crate::camera::{Delivery, DeliveryArgs, DeviceArgs, deliver, receive};
 use crate::failure::Failure;
 use crate::output::{OutputArgs, OutputFolder};
 use crate::terminal::{Outcome, Terminal};
@@ -45,9 +45,7 @@ impl Demo {
                  degree falls in four rings towards it. Around it unpolarized grey, a wedge, a black patch, and three specular \
                  spots that clip.",
             ),
-            verify: true,
-            raw: false,
-            keep: false,
+            args: &DeliveryArgs { verify: true, raw: false, keep: false },
             extra: Some(&|image| against_truth(image, &truth)),
         };
         deliver(&mut opened, &received, folder, &delivery, terminal)

@@ -4,7 +4,7 @@ use clap::Args;
 use protocol_wire::{CaptureId, CaptureState};
 use serde_json::json;
 
-use crate::camera::{Delivery, DeviceArgs, deliver, link_failure, receive};
+use crate::camera::{Delivery, DeliveryArgs, DeviceArgs, deliver, link_failure, receive};
 use crate::failure::Failure;
 use crate::output::{OutputArgs, OutputFolder};
 use crate::terminal::{Outcome, Terminal};
@@ -19,15 +19,8 @@ pub(crate) struct Fetch {
     /// Number of the capture; without it, the captures are listed
     #[arg(value_name = "NUMBER")]
     id: Option<u32>,
-    /// Recompute every integer from the raw frames and compare bit for bit (the capture must have its raw frames)
-    #[arg(long)]
-    verify: bool,
-    /// Also write the raw frames (the capture must have them)
-    #[arg(long)]
-    raw: bool,
-    /// Leave the capture on the camera
-    #[arg(long)]
-    keep: bool,
+    #[command(flatten)]
+    delivery: DeliveryArgs,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -53,14 +46,12 @@ impl Fetch {
             return Ok(Outcome { brief: text.clone(), text, json: json!({ "command": "fetch", "captures": list }) });
         };
         let folder = OutputFolder::prepare(&self.output, &format!("capture-{}", opened.client.identity().serial))?;
-        let received = receive(&mut opened, CaptureId(id), self.verify || self.raw, terminal)?;
+        let received = receive(&mut opened, CaptureId(id), self.delivery.needs_raw(), terminal)?;
         let title = format!("Capture {id} of {}", opened.client.identity().board);
         let delivery = Delivery {
             command: "fetch",
             title: (&title, "Intensity, degree and angle of linear polarization, computed in the camera."),
-            verify: self.verify,
-            raw: self.raw,
-            keep: self.keep,
+            args: &self.delivery,
             extra: None,
         };
         deliver(&mut opened, &received, folder, &delivery, terminal)
