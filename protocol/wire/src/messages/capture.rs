@@ -137,7 +137,7 @@ pub enum PlaneKind {
     Flags,
     /// rms residual per degree of freedom, unsigned; only with more than three frames.
     Residual,
-    /// Preview: degree of linear polarization, u8, 255 = 1.
+    /// Preview: degree of linear polarization, u8, 256 = 1, clamped to 255.
     PreviewDolp,
     /// Preview: angle of linear polarization, u8, 256 = 180°.
     PreviewAolp,
