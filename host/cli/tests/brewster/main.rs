@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests fail by panicking, as tests do")]
 
 mod bad_input;
+mod broken_line;
 mod camera;
 mod good_input;
 mod output;
