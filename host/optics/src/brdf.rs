@@ -53,10 +53,11 @@ impl Reflection {
     #[must_use]
     pub fn apply(&self, light: [f64; 3]) -> [f64; 3] {
         let [l, q, u] = self.into_plane.apply_linear(light);
-        let r = &self.reflectance;
-        let mean = 0.5 * (r.perpendicular + r.parallel);
-        let half = 0.5 * (r.perpendicular - r.parallel);
-        self.out_of_plane.apply_linear([mean * l + half * q, half * l + mean * q, r.rr_cos_delta * u])
+        // Along the s axis and across it: no cancellation, as in [`crate::trs::MirrorFacet::stokes`].
+        let perpendicular = 0.5 * self.reflectance.perpendicular * (l + q);
+        let parallel = 0.5 * self.reflectance.parallel * (l - q);
+        let s2 = self.reflectance.rr_cos_delta * u;
+        self.out_of_plane.apply_linear([perpendicular + parallel, perpendicular - parallel, s2])
     }
 
     /// The upper left 3 × 3 of [`Self::mueller`].

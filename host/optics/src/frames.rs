@@ -6,17 +6,18 @@
 //! which is all a Mueller matrix asks for and stays smooth where α jumps by π.
 
 use crate::OpticsError;
+use crate::real::single;
 use glam::DVec3;
 use protocol_polar::{Mueller, Radians};
 
 /// An angle θ in [0, π] between a direction and a normal as (cos θ, sin² θ), both accurate: sin² comes from a cross
 /// product or a difference of vectors and never from 1 − cos².
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Incidence {
+pub struct Incidence<T = f64> {
     /// cos θ.
-    pub cosine: f64,
+    pub cosine: T,
     /// sin² θ.
-    pub sine_squared: f64,
+    pub sine_squared: T,
 }
 
 impl Incidence {
@@ -37,6 +38,12 @@ impl Incidence {
     #[must_use]
     pub fn on_facet(wi: DVec3, wo: DVec3) -> Self {
         Self { cosine: 0.5 * (wi + wo).length(), sine_squared: 0.25 * (wi - wo).length_squared() }
+    }
+
+    /// Both numbers rounded to f32, for lanes.
+    #[must_use]
+    pub fn single(self) -> Incidence<f32> {
+        Incidence { cosine: single(self.cosine), sine_squared: single(self.sine_squared) }
     }
 }
 
@@ -180,10 +187,12 @@ pub fn tangents(normal: DVec3) -> (DVec3, DVec3) {
     normal.any_orthonormal_pair()
 }
 
-/// Parallel transport along the great circle of a vector `v` across unit `from`, to unit `to` (not antipodal).
+/// Parallel transport along the great circle of a vector `v` across unit `from`, to unit `to`. Between antipodes no great
+/// circle is the shortest; `v`, which lies across both, stays what it is.
 #[must_use]
 pub fn transport(v: DVec3, from: DVec3, to: DVec3) -> DVec3 {
-    v - (from + to) * (v.dot(to) / (1.0 + from.dot(to)))
+    let apart = 1.0 + from.dot(to);
+    if apart > 0.0 { v - (from + to) * (v.dot(to) / apart) } else { v }
 }
 
 fn sky_axis(w: DVec3) -> DVec3 {
@@ -191,7 +200,8 @@ fn sky_axis(w: DVec3) -> DVec3 {
 }
 
 fn across(axis: DVec3, k: DVec3) -> Result<DVec3, OpticsError> {
-    scaled_unit(axis - k * axis.dot(k)).ok_or(OpticsError::AxisAlongRay)
+    let across = scaled_unit(axis).and_then(|axis| scaled_unit(axis - k * axis.dot(k)));
+    across.ok_or(OpticsError::AxisAlongRay)
 }
 
 /// Unit vector along `v`, without overflow or underflow on the way; `None` where there is none.

@@ -1,67 +1,74 @@
 //! Fresnel reflection from outside, in the forms that survive f64 and f32 at normal incidence, Brewster and grazing.
 //!
-//! c = cos θ and s² = sin² θ come in as one [`Incidence`]; q = √(η² − 1 + c²) is formed from (η − 1)(η + 1). The sign of
+//! c = cos θ and s² = sin² θ come in as one [`Incidence`], a cosine below 0 counts as 0; q = √(η² − 1 + c²). The sign of
 //! r_p is that of right-handed frames on both sides: r_s r_p < 0 at normal incidence, δ = arg r_p − arg r_s (180° below
-//! Brewster, 0° above), fields exp(−iωt) with η = n + ik. Worst error of every form over the whole domain: 16 ulp of
-//! itself (of R⊥ for R∥ and the δ terms); docs/NUMERICS.md has each.
+//! Brewster, 0° above), fields exp(−iωt) with η = n + ik.
+//!
+//! R⊥ = (η² − 1)²/(c + q)⁴ takes the roundings of c + q four times. So (c + q)² is not squared but summed: it equals
+//! 4c² + (η² − 1) + 2c (q − c), and q − c = (η² − 1)/(c + q) keeps its digits where it is small. Worst error of every
+//! function over the whole domain: 8 ulp of itself (of R⊥ for R∥ and the δ terms), 10 for R⊥ − R∥ of a conductor;
+//! docs/NUMERICS.md has each.
 
-use crate::{Conductor, Dielectric, Incidence, Ior, OpticsError};
+use crate::{Conductor, Dielectric, Incidence, Ior, OpticsError, Real};
 use protocol_polar::Reflectance;
 
 /// How R⊥ and t of a dielectric change; see [`Dielectric::gradient`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gradient {
+pub struct Gradient<T = f64> {
     /// ∂R⊥/∂η.
-    pub perpendicular_by_eta: f64,
+    pub perpendicular_by_eta: T,
     /// ∂t/∂η.
-    pub t_by_eta: f64,
+    pub t_by_eta: T,
     /// ∂R⊥/∂c along the circle c² + s² = 1 (∂/∂θ = −s ∂/∂c).
-    pub perpendicular_by_cosine: f64,
+    pub perpendicular_by_cosine: T,
     /// ∂t/∂c along the circle c² + s² = 1.
-    pub t_by_cosine: f64,
+    pub t_by_cosine: T,
 }
 
 impl Dielectric {
-    /// r_s = −(η² − 1)/(c + q)², in [−1, 0].
+    /// R⊥, R∥ and √(R⊥R∥) cos δ of [`Self::terms`] as the entries of paper eq. 2.
     #[must_use]
-    pub fn r_s(self, at: Incidence) -> f64 {
-        let e = self.contrast();
-        // Without contrast there is no interface, at grazing incidence included (where the form is 0/0).
-        if e == 0.0 { 0.0 } else { -e / (at.cosine + self.q(at)).powi(2) }
+    pub fn reflectance(self, at: Incidence) -> Reflectance {
+        let [perpendicular, parallel, rr_cos_delta] = self.terms(at);
+        Reflectance { perpendicular, parallel, rr_cos_delta, rr_sin_delta: 0.0 }
+    }
+}
+
+impl<T: Real> Dielectric<T> {
+    /// r_s = −(η² − 1)/(c + q)², in [−1, 0]; without contrast there is no interface, at grazing incidence included.
+    #[must_use]
+    pub fn r_s(self, at: Incidence<T>) -> T {
+        -Refracted::new(self, at).reflected()
     }
 
     /// t = −r_p/r_s = (cq − s²)/(cq + s²), in [−1, 1]: 1 at normal incidence, 0 at the Brewster angle, −1 at grazing.
     #[must_use]
-    pub fn t(self, at: Incidence) -> f64 {
-        let cq = at.cosine * self.q(at);
-        (cq - at.sine_squared) / (cq + at.sine_squared)
+    pub fn t(self, at: Incidence<T>) -> T {
+        Refracted::new(self, at).t()
     }
 
-    /// R⊥, R∥ = R⊥ t² and √(R⊥R∥) cos δ = −R⊥ t, which crosses zero at Brewster without a square root.
+    /// \[R⊥, R∥, √(R⊥R∥) cos δ\] with R∥ = R⊥ t² and √(R⊥R∥) cos δ = −R⊥ t, which crosses zero at Brewster without a
+    /// square root.
     #[must_use]
-    pub fn reflectance(self, at: Incidence) -> Reflectance {
-        let perpendicular = self.r_s(at).powi(2);
-        let t = self.t(at);
-        Reflectance {
-            perpendicular,
-            parallel: perpendicular * t * t,
-            rr_cos_delta: -perpendicular * t,
-            rr_sin_delta: 0.0,
-        }
+    pub fn terms(self, at: Incidence<T>) -> [T; 3] {
+        let refracted = Refracted::new(self, at);
+        let (perpendicular, t) = (refracted.reflected().squared(), refracted.t());
+        [perpendicular, perpendicular * t.squared(), -perpendicular * t]
     }
 
     /// R⊥ − R∥ = 4 R⊥ c q s²/(cq + s²)², accurate relative to itself down to normal incidence.
     #[must_use]
-    pub fn difference(self, at: Incidence) -> f64 {
-        let cq = at.cosine * self.q(at);
-        4.0 * self.r_s(at).powi(2) * cq * at.sine_squared / (cq + at.sine_squared).powi(2)
+    pub fn difference(self, at: Incidence<T>) -> T {
+        let refracted = Refracted::new(self, at);
+        let m = refracted.smaller_share();
+        T::FOUR * refracted.reflected().squared() * (m - m * m)
     }
 
     /// DoLP (R⊥ − R∥)/(R⊥ + R∥) = 2cqs²/(c²q² + s⁴) of reflected unpolarized light, in [0, 1].
     #[must_use]
-    pub fn specular_dolp(self, at: Incidence) -> f64 {
-        let cq = at.cosine * self.q(at);
-        2.0 * cq * at.sine_squared / (cq * cq + at.sine_squared * at.sine_squared)
+    pub fn specular_dolp(self, at: Incidence<T>) -> T {
+        let Refracted { cq, s2, .. } = Refracted::new(self, at);
+        (T::TWO * cq * s2).over(cq * cq + s2 * s2)
     }
 
     /// Derivatives of R⊥ and t by η and by the cosine:
@@ -71,34 +78,32 @@ impl Dielectric {
     /// Finite everywhere; at η = 1 and grazing incidence together (q = 0), where the limit depends on the way there, all
     /// four are 0.
     #[must_use]
-    pub fn gradient(self, at: Incidence) -> Gradient {
-        let (c, s2, q, e, eta) = (at.cosine, at.sine_squared, self.q(at), self.contrast(), self.eta());
-        if q == 0.0 {
-            return Gradient {
-                perpendicular_by_eta: 0.0,
-                t_by_eta: 0.0,
-                perpendicular_by_cosine: 0.0,
-                t_by_cosine: 0.0,
-            };
-        }
-        let sum_squared = (c + q).powi(2);
-        let w = q * (c * q + s2).powi(2);
+    pub fn gradient(self, at: Incidence<T>) -> Gradient<T> {
+        let eta = self.eta();
+        let refracted = Refracted::new(self, at);
+        let (r, m) = (refracted.reflected(), refracted.smaller_share());
+        let Refracted { e, c, s2, q, cq, sum_squared } = refracted;
+        let (c2, b) = (c * c, cq + s2);
+        // r/(q (c + q)²), with which R⊥/q is (η² − 1) times this.
+        let slope = T::FOUR * r.over(q * sum_squared);
         Gradient {
-            perpendicular_by_eta: 4.0 * eta * (c / q) * e / (sum_squared * sum_squared),
-            t_by_eta: 2.0 * c * s2 * eta / w,
-            perpendicular_by_cosine: -4.0 * self.r_s(at).powi(2) / q,
-            t_by_cosine: 2.0 * (s2 * (q * q + c * c) + 2.0 * (c * q).powi(2)) / w,
+            perpendicular_by_eta: eta * c * slope,
+            // 2 cqs²/b² · η/q², the first factor with the two shares of b and the second with q² as it was before its root.
+            t_by_eta: T::TWO * (m - m * m) * eta.over(e + c2),
+            perpendicular_by_cosine: -e * slope,
+            t_by_cosine: (T::TWO * (s2 * (q * q + c2) + T::TWO * (cq * cq))).over(q * (b * b)),
         }
     }
 
     /// Transmittances (T⊥, T∥) into the medium, 4cq/(c + q)² and 4cqη²/(η²c + q)²: 1 − R without its cancellation.
     #[must_use]
-    pub fn transmittance(self, at: Incidence) -> [f64; 2] {
-        let (c, q, eta2) = (at.cosine, self.q(at), self.eta().powi(2));
-        if self.contrast() == 0.0 {
-            return [1.0, 1.0];
+    pub fn transmittance(self, at: Incidence<T>) -> [T; 2] {
+        let Refracted { e, c, q, cq, sum_squared, .. } = Refracted::new(self, at);
+        if e <= T::ZERO {
+            return [T::ONE, T::ONE];
         }
-        [4.0 * c * q / (c + q).powi(2), 4.0 * c * q * eta2 / (eta2 * c + q).powi(2)]
+        let eta = self.eta();
+        [T::FOUR * cq / sum_squared, T::FOUR * cq * (eta / (eta * eta * c + q)).squared()]
     }
 
     /// The inverse: η from R⊥ in [0, 1) at one incidence, η = √(s² + c²((1 + ρ)/(1 − ρ))²), ρ = √R⊥.
@@ -106,33 +111,78 @@ impl Dielectric {
     /// # Errors
     /// [`OpticsError::NotADielectric`] if R⊥ is outside [0, 1), the incidence is grazing or worse (c <= 0), or the
     /// index found is beyond 1000.
-    pub fn from_perpendicular(reflectance: f64, at: Incidence) -> Result<Self, OpticsError> {
-        let refused = OpticsError::NotADielectric { reflectance, cosine: at.cosine };
-        if !(0.0..1.0).contains(&reflectance) || at.cosine <= 0.0 {
+    pub fn from_perpendicular(reflectance: T, at: Incidence<T>) -> Result<Self, OpticsError> {
+        let refused = OpticsError::NotADielectric { reflectance: reflectance.into(), cosine: at.cosine.into() };
+        if !(T::ZERO..T::ONE).contains(&reflectance) || at.cosine <= T::ZERO {
             return Err(refused);
         }
         let rho = reflectance.sqrt();
         // η − 1 from η² − 1 = c² ((1 + ρ)² − (1 − ρ)²)/(1 − ρ)² = 4ρc²/(1 − ρ)²: exact near η = 1. And 1 − ρ from 1 − R⊥,
         // which keeps all that R⊥ near 1 says at grazing incidence; the root's rounding would drown it.
-        let e = 4.0 * rho * (at.cosine * (1.0 + rho) / (1.0 - reflectance)).powi(2);
-        Self::new(1.0 + e / (1.0 + (1.0 + e).sqrt())).map_err(|_| refused)
+        let e = T::FOUR * rho * (at.cosine * (T::ONE + rho) / (T::ONE - reflectance)).squared();
+        Self::found(T::ONE + e / (T::ONE + (T::ONE + e).sqrt())).ok_or(refused)
     }
 
     /// The Brewster angle's cosine and sin²: tan θ = η.
     #[must_use]
-    pub fn brewster(self) -> Incidence {
-        let eta2 = self.eta().powi(2);
-        Incidence { cosine: 1.0 / (1.0 + eta2).sqrt(), sine_squared: eta2 / (1.0 + eta2) }
+    pub fn brewster(self) -> Incidence<T> {
+        let eta2 = self.eta().squared();
+        Incidence { cosine: T::ONE / (T::ONE + eta2).sqrt(), sine_squared: eta2 / (T::ONE + eta2) }
     }
 
+    /// η² − 1, from η − 1, which is exact.
+    #[inline]
+    fn contrast(self) -> T {
+        let d = self.eta() - T::ONE;
+        T::TWO * d + d * d
+    }
+}
+
+/// What the functions of a dielectric share at one incidence.
+#[derive(Clone, Copy)]
+struct Refracted<T> {
     /// η² − 1.
-    fn contrast(self) -> f64 {
-        (self.eta() - 1.0) * (self.eta() + 1.0)
+    e: T,
+    /// cos θ, not below 0.
+    c: T,
+    /// sin² θ.
+    s2: T,
+    /// η cos θ_t = √(η² − 1 + c²).
+    q: T,
+    cq: T,
+    /// (c + q)².
+    sum_squared: T,
+}
+
+impl<T: Real> Refracted<T> {
+    #[inline]
+    fn new(interface: Dielectric<T>, at: Incidence<T>) -> Self {
+        let (e, c, s2) = (interface.contrast(), at.cosine.at_least(T::ZERO), at.sine_squared);
+        let c2 = c * c;
+        let root = (e + c2).sqrt();
+        // q − c, of which c takes the larger part of the root's rounding away.
+        let excess = e.over(c + root);
+        let q = if excess < c { c + excess } else { root };
+        Self { e, c, s2, q, cq: c * q, sum_squared: T::FOUR * c2 + (e + T::TWO * c * excess) }
     }
 
-    /// q = η cos θ_t = √(η² − 1 + c²).
-    fn q(self, at: Incidence) -> f64 {
-        (self.contrast() + at.cosine * at.cosine).sqrt()
+    /// |r_s|.
+    #[inline]
+    fn reflected(&self) -> T {
+        self.e.over(self.sum_squared)
+    }
+
+    /// The share in [0, ½] of the smaller of cq and s² in their sum.
+    #[inline]
+    fn smaller_share(&self) -> T {
+        self.cq.at_most(self.s2).over(self.cq + self.s2)
+    }
+
+    /// t as 1 minus twice the smaller share: at both ends as 1 minus what is small.
+    #[inline]
+    fn t(&self) -> T {
+        let size = T::ONE - T::TWO * self.smaller_share();
+        if self.cq < self.s2 { -size } else { size }
     }
 }
 
@@ -140,63 +190,126 @@ impl Conductor {
     /// R⊥ = |r_s|², R∥ = R⊥|t|², √(R⊥R∥) cos δ = −R⊥ Re t, √(R⊥R∥) sin δ = −R⊥ Im t.
     #[must_use]
     pub fn reflectance(self, at: Incidence) -> Reflectance {
-        let (re, im) = self.q(at);
-        let (c, s2) = (at.cosine, at.sine_squared);
-        let perpendicular = self.perpendicular(at);
+        let [perpendicular, parallel, rr_cos_delta, rr_sin_delta] = self.terms(at);
+        Reflectance { perpendicular, parallel, rr_cos_delta, rr_sin_delta }
+    }
+}
+
+impl<T: Real> Conductor<T> {
+    /// \[R⊥, R∥, √(R⊥R∥) cos δ, √(R⊥R∥) sin δ\], as [`Conductor::reflectance`].
+    #[must_use]
+    pub fn terms(self, at: Incidence<T>) -> [T; 4] {
+        let wave = Absorbed::new(self, at);
+        let perpendicular = wave.perpendicular();
         // t = (cq − s²)/(cq + s²) with the denominator made real.
-        let (a, b) = (c * re, c * im);
-        let inverse = 1.0 / ((a + s2).powi(2) + b * b);
-        let t_re = ((a - s2) * (a + s2) + b * b) * inverse;
-        let t_im = 2.0 * b * s2 * inverse;
-        Reflectance {
-            perpendicular,
-            parallel: perpendicular * ((a - s2).powi(2) + b * b) * inverse,
-            rr_cos_delta: -perpendicular * t_re,
-            rr_sin_delta: -perpendicular * t_im,
-        }
+        let (q, correction, s2) = (wave.q, wave.correction, wave.s2);
+        let (a, b) = (wave.c * (q.0 + correction.0), wave.c * (q.1 + correction.1));
+        let denominator = wave.even + wave.cross;
+        let lost = (T::TWO * wave.cross).over(denominator);
+        let t_squared = if lost < T::HALF { T::ONE - lost } else { ((a - s2).squared() + b * b).over(denominator) };
+        let t_re = (wave.c2 * wave.modulus - s2 * s2).over(denominator);
+        let t_im = (T::TWO * (b * s2)).over(denominator);
+        [perpendicular, perpendicular * t_squared, -perpendicular * t_re, -perpendicular * t_im]
     }
 
     /// R⊥ − R∥ = 4 R⊥ c Re(q) s²/|cq + s²|².
     #[must_use]
-    pub fn difference(self, at: Incidence) -> f64 {
-        let (re, im) = self.q(at);
-        let (c, s2) = (at.cosine, at.sine_squared);
-        4.0 * self.perpendicular(at) * c * re * s2 / ((c * re + s2).powi(2) + (c * im).powi(2))
+    pub fn difference(self, at: Incidence<T>) -> T {
+        let wave = Absorbed::new(self, at);
+        wave.perpendicular() * (T::TWO * wave.cross).over(wave.even + wave.cross)
     }
 
     /// DoLP 2c Re(q) s²/(c²|q|² + s⁴) of reflected unpolarized light.
     #[must_use]
-    pub fn specular_dolp(self, at: Incidence) -> f64 {
-        let (re, im) = self.q(at);
-        let (c, s2) = (at.cosine, at.sine_squared);
-        2.0 * c * re * s2 / (c * c * (re * re + im * im) + s2 * s2)
+    pub fn specular_dolp(self, at: Incidence<T>) -> T {
+        let wave = Absorbed::new(self, at);
+        wave.cross.over(wave.even)
     }
+}
 
-    /// |r_s|² = |η² − 1|²/|c + q|⁴.
-    fn perpendicular(self, at: Incidence) -> f64 {
-        let (re, im) = self.q(at);
-        let (e_re, e_im) = self.contrast();
-        (e_re * e_re + e_im * e_im) / ((at.cosine + re).powi(2) + im * im).powi(2)
-    }
-
+/// What the functions of a conductor share at one incidence.
+struct Absorbed<T> {
+    c: T,
+    c2: T,
+    s2: T,
     /// η² − 1.
-    fn contrast(self) -> (f64, f64) {
-        let (n, k) = (self.n(), self.k());
-        ((n - 1.0) * (n + 1.0) - k * k, 2.0 * n * k)
+    e: (T, T),
+    /// q = √(η² − 1 + c²) in the first quadrant: the transmitted wave decays.
+    q: (T, T),
+    /// What is missing from q.
+    correction: (T, T),
+    /// |q|².
+    modulus: T,
+    /// c²|q|² + s⁴; |cq ± s²|² is this ± `cross`.
+    even: T,
+    /// 2 c Re(q) s².
+    cross: T,
+}
+
+impl<T: Real> Absorbed<T> {
+    fn new(interface: Conductor<T>, at: Incidence<T>) -> Self {
+        let (n, k, c, s2) = (interface.n(), interface.k(), at.cosine.at_least(T::ZERO), at.sine_squared);
+        // Near the critical angle of n < 1 the squares cancel to nothing but 2nk: they are summed with their rounding errors.
+        let ((n2, n2_low), (k2, k2_low), (c2, c2_low)) = (n.product(n), k.product(k), c.product(c));
+        let (first, first_low) = n2.sum(-T::ONE);
+        let (second, second_low) = first.sum(-k2);
+        let low = first_low + second_low + (n2_low - k2_low);
+        let (third, third_low) = second.sum(c2);
+        let (real, real_low) = third.sum(third_low + (low + c2_low));
+        let (imaginary, imaginary_low) = (T::TWO * n).product(k);
+        let modulus = real.hypot(imaginary);
+        // The larger part from a sum, the smaller from the product 2 Re Im: no cancellation in either half plane.
+        let (re, im) = if real >= T::ZERO {
+            let x = (T::HALF * (modulus + real)).sqrt();
+            (x, (T::HALF * imaginary).over(x))
+        } else {
+            let y = (T::HALF * (modulus - real)).sqrt();
+            ((T::HALF * imaginary).over(y), y)
+        };
+        // One step of Newton's takes their roundings off: q += (q² as it should be − q²)/(2q).
+        let ((a2, a2_low), (b2, b2_low), (ab, ab_low)) = (re.product(re), im.product(im), re.product(im));
+        let off_re = ((real - a2) + b2) + (real_low - a2_low + b2_low);
+        let off_im = (imaginary - T::TWO * ab) + (imaginary_low - T::TWO * ab_low);
+        let correction = (
+            (T::HALF * (off_re * re + off_im * im)).over(modulus),
+            (T::HALF * (off_im * re - off_re * im)).over(modulus),
+        );
+        let cross = T::TWO * (c * (re + correction.0)) * s2;
+        Self {
+            c,
+            c2,
+            s2,
+            e: (second + low, imaginary),
+            q: (re, im),
+            correction,
+            modulus,
+            even: c2 * modulus + s2 * s2,
+            cross,
+        }
     }
 
-    /// q = √(η² − 1 + c²) in the first quadrant: the transmitted wave decays.
-    fn q(self, at: Incidence) -> (f64, f64) {
-        let (e, im) = self.contrast();
-        let re = e + at.cosine * at.cosine;
-        let modulus = re.hypot(im);
-        // The larger part from a sum, the smaller from the product 2 Re Im: no cancellation in either half plane.
-        if re >= 0.0 {
-            let x = (0.5 * (modulus + re)).sqrt();
-            (x, 0.5 * im / x)
+    /// |r_s|² = |q − c|²/|q + c|²: from 1 − R⊥ = 4c Re(q)/|q + c|² if that is small, and from |η² − 1|²/|(c + q)²|², with the
+    /// square as for a dielectric, if q − c has nothing left.
+    fn perpendicular(&self) -> T {
+        let Self { c, c2, e: (e_re, e_im), q: (re, im), correction, .. } = *self;
+        // Each sum rounded once.
+        let ((sum, sum_low), (rest, rest_low)) = (c.sum(re), c.sum(-re));
+        let (sum_re, sum_im) = (sum + (sum_low + correction.0), im + correction.1);
+        let sum_squared = sum_re.squared() + sum_im.squared();
+        if sum_squared <= T::ZERO {
+            return T::ZERO;
+        }
+        let difference_squared = (rest + (rest_low - correction.0)).squared() + sum_im.squared();
+        let transmitted = T::FOUR * (c * (re + correction.0)) / sum_squared;
+        if transmitted < T::HALF {
+            T::ONE - transmitted
+        } else if difference_squared > T::LITTLE * sum_squared {
+            difference_squared / sum_squared
         } else {
-            let y = (0.5 * (modulus - re)).sqrt();
-            (0.5 * im / y, y)
+            let (excess_re, excess_im) =
+                ((e_re * sum_re + e_im * sum_im) / sum_squared, (e_im * sum_re - e_re * sum_im) / sum_squared);
+            let (x, y) = (T::FOUR * c2 + (e_re + T::TWO * c * excess_re), e_im + T::TWO * c * excess_im);
+            (e_re * e_re + e_im * e_im).over(x * x + y * y)
         }
     }
 }

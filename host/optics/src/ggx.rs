@@ -4,9 +4,13 @@
 //! Angles come as [`Incidence`] against the mean normal, so that D = α²/(π (α²c² + s²)²) and Λ hold to a few ulp down to
 //! α = 1e-6. The limit α → 0 is the mirror: D cos θ_h tends to a delta at the normal, Λ to 0, a sampled facet to the
 //! normal itself; [`crate::integral::mirror`] is that limit in closed form.
+//!
+//! For unit vectors α²c² + s² >= α². Lower bounds of half of that, and of [`Real::TINY`] for products of cosines, do nothing
+//! to them and keep what is made of other vectors finite.
 
-use crate::{Incidence, OpticsError};
-use core::f64::consts::{FRAC_1_PI, TAU};
+use crate::real::single;
+use crate::{Incidence, OpticsError, Real};
+use core::f64::consts::TAU;
 use glam::DVec3;
 
 /// Smallest roughness: below it the lobe (0.1 mrad at 1e-4 already) is a mirror to any camera.
@@ -24,8 +28,8 @@ pub enum Masking {
 
 /// An isotropic GGX surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ggx {
-    alpha: f64,
+pub struct Ggx<T = f64> {
+    alpha: T,
     masking: Masking,
 }
 
@@ -42,105 +46,15 @@ impl Ggx {
         }
     }
 
-    /// α.
+    /// The same surface with α rounded to f32, for lanes.
     #[must_use]
-    pub fn alpha(&self) -> f64 {
-        self.alpha
-    }
-
-    /// How masking and shadowing combine.
-    #[must_use]
-    pub fn masking(&self) -> Masking {
-        self.masking
-    }
-
-    /// D(h), per steradian; 0 for facets that look down. ∫ D cos θ_h dω = 1.
-    #[must_use]
-    pub fn d(&self, h: Incidence) -> f64 {
-        if h.cosine <= 0.0 {
-            return 0.0;
-        }
-        let a2 = self.alpha * self.alpha;
-        FRAC_1_PI * a2 / (a2 * h.cosine * h.cosine + h.sine_squared).powi(2)
-    }
-
-    /// ∂D/∂α = 2α (s² − α²c²)/(π (α²c² + s²)³).
-    #[must_use]
-    pub fn d_by_alpha(&self, h: Incidence) -> f64 {
-        if h.cosine <= 0.0 {
-            return 0.0;
-        }
-        let b = (self.alpha * h.cosine).powi(2);
-        2.0 * FRAC_1_PI * self.alpha * (h.sine_squared - b) / (b + h.sine_squared).powi(3)
-    }
-
-    /// Smith Λ = x/(2 (1 + √(1 + x))), x = α² tan² θ; infinite at and below the horizon.
-    #[must_use]
-    pub fn lambda(&self, v: Incidence) -> f64 {
-        if v.cosine <= 0.0 {
-            return f64::INFINITY;
-        }
-        // With r = √(c² + α²s²): Λ = α²s²/(2c (c + r)), free of tan².
-        0.5 * self.alpha * self.alpha * v.sine_squared / (v.cosine * (v.cosine + self.slant(v)))
-    }
-
-    /// ∂Λ/∂α = α s²/(2c √(c² + α²s²)).
-    #[must_use]
-    pub fn lambda_by_alpha(&self, v: Incidence) -> f64 {
-        if v.cosine <= 0.0 { 0.0 } else { 0.5 * self.alpha * v.sine_squared / (v.cosine * self.slant(v)) }
-    }
-
-    /// G1 = 1/(1 + Λ), in [0, 1].
-    #[must_use]
-    pub fn g1(&self, v: Incidence) -> f64 {
-        if v.cosine <= 0.0 { 0.0 } else { 2.0 * v.cosine / (v.cosine + self.slant(v)) }
-    }
-
-    /// G2 in [0, 1]; 0 if either direction is at or below the horizon.
-    #[must_use]
-    pub fn g2(&self, i: Incidence, o: Incidence) -> f64 {
-        if i.cosine <= 0.0 || o.cosine <= 0.0 {
-            return 0.0;
-        }
-        match self.masking {
-            Masking::HeightCorrelated => 1.0 / (1.0 + self.lambda(i) + self.lambda(o)),
-            Masking::Separable => self.g1(i) * self.g1(o),
-        }
-    }
-
-    /// G2/(4 cos θ_i cos θ_o), which stays finite where the cosines vanish: with r = √(c² + α²s²),
-    /// 1/(2 (c_o r_i + c_i r_o)) height-correlated, 1/((c_i + r_i)(c_o + r_o)) separable.
-    #[must_use]
-    pub fn visibility(&self, i: Incidence, o: Incidence) -> f64 {
-        if i.cosine <= 0.0 || o.cosine <= 0.0 {
-            return 0.0;
-        }
-        let (ri, ro) = (self.slant(i), self.slant(o));
-        match self.masking {
-            Masking::HeightCorrelated => 0.5 / (o.cosine * ri + i.cosine * ro),
-            Masking::Separable => 1.0 / ((i.cosine + ri) * (o.cosine + ro)),
-        }
-    }
-
-    /// ∂/∂α of [`Self::visibility`].
-    #[must_use]
-    pub fn visibility_by_alpha(&self, i: Incidence, o: Incidence) -> f64 {
-        if i.cosine <= 0.0 || o.cosine <= 0.0 {
-            return 0.0;
-        }
-        let v = self.visibility(i, o);
-        let (ri, ro) = (self.slant(i), self.slant(o));
-        // ∂r/∂α = α s²/r.
-        let (di, dr) = (self.alpha * i.sine_squared / ri, self.alpha * o.sine_squared / ro);
-        match self.masking {
-            Masking::HeightCorrelated => -2.0 * v * v * (o.cosine * di + i.cosine * dr),
-            Masking::Separable => -v * (di / (i.cosine + ri) + dr / (o.cosine + ro)),
-        }
+    pub fn single(&self) -> Ggx<f32> {
+        Ggx { alpha: single(self.alpha), masking: self.masking }
     }
 
     /// A facet normal visible from `wo`, both in the local frame (mean normal +z, `wo.z > 0`), for (u1, u2) in [0, 1)².
     ///
-    /// Density: [`Self::visible_density`]. Smooth in α and `wo` for fixed (u1, u2). Spherical caps: Dupuy and Benyoub
+    /// Density: [`Ggx::visible_density`]. Smooth in α and `wo` for fixed (u1, u2). Spherical caps: Dupuy and Benyoub
     /// 2023, "Sampling Visible GGX Normals with Spherical Caps", listing 3, with sin² and z + w_z rewritten so that
     /// α → 0 and grazing views lose no digits.
     #[must_use]
@@ -155,26 +69,158 @@ impl Ggx {
         // height = 0 only at the very rim of the cap (u2 → 1): a vertical facet.
         h.try_normalize().unwrap_or(DVec3::Z)
     }
+}
 
-    /// Density per steradian of h of [`Self::sample_visible`]: G1(ω_o) D(h) (ω_o·h)/(n·ω_o). For ω_i mirrored at h divide
+impl<T: Real> Ggx<T> {
+    /// α.
+    #[must_use]
+    pub fn alpha(&self) -> T {
+        self.alpha
+    }
+
+    /// How masking and shadowing combine.
+    #[must_use]
+    pub fn masking(&self) -> Masking {
+        self.masking
+    }
+
+    /// D(h), per steradian; 0 for facets that look down. ∫ D cos θ_h dω = 1.
+    #[must_use]
+    pub fn d(&self, h: Incidence<T>) -> T {
+        if h.cosine <= T::ZERO {
+            return T::ZERO;
+        }
+        T::FRAC_1_PI * (T::ONE / self.spread(h)).squared()
+    }
+
+    /// ∂D/∂α = 2α (s² − α²c²)/(π (α²c² + s²)³).
+    #[must_use]
+    pub fn d_by_alpha(&self, h: Incidence<T>) -> T {
+        if h.cosine <= T::ZERO {
+            return T::ZERO;
+        }
+        let spread = self.spread(h);
+        let root = T::ONE / spread;
+        // (s² − α²c²)/(s² + α²c²), at both ends as 1 minus what is small.
+        let (narrow, wide) = (self.alpha * (h.cosine * h.cosine), h.sine_squared / self.alpha);
+        let m = narrow.at_most(wide) / spread;
+        let ratio = if m > T::HALF * T::HALF {
+            (wide - narrow) / spread
+        } else if wide < narrow {
+            T::TWO * m - T::ONE
+        } else {
+            T::ONE - T::TWO * m
+        };
+        T::TWO * T::FRAC_1_PI * (root * root) * ratio / self.alpha
+    }
+
+    /// Smith Λ = x/(2 (1 + √(1 + x))), x = α² tan² θ; infinite at and below the horizon.
+    #[must_use]
+    pub fn lambda(&self, v: Incidence<T>) -> T {
+        if v.cosine <= T::ZERO {
+            return T::INFINITY;
+        }
+        // With r = √(c² + α²s²): Λ = α²s²/(2c (c + r)), free of tan².
+        T::HALF * self.alpha * self.alpha * v.sine_squared / (v.cosine * (v.cosine + self.slant(v))).at_least(T::TINY)
+    }
+
+    /// ∂Λ/∂α = α s²/(2c √(c² + α²s²)).
+    #[must_use]
+    pub fn lambda_by_alpha(&self, v: Incidence<T>) -> T {
+        if v.cosine <= T::ZERO {
+            return T::ZERO;
+        }
+        T::HALF * self.alpha * v.sine_squared / (v.cosine * self.slant(v)).at_least(T::TINY)
+    }
+
+    /// G1 = 1/(1 + Λ), in [0, 1].
+    #[must_use]
+    pub fn g1(&self, v: Incidence<T>) -> T {
+        if v.cosine <= T::ZERO { T::ZERO } else { T::TWO * v.cosine / (v.cosine + self.slant(v)) }
+    }
+
+    /// G2 in [0, 1]; 0 if either direction is at or below the horizon.
+    #[must_use]
+    pub fn g2(&self, i: Incidence<T>, o: Incidence<T>) -> T {
+        if i.cosine <= T::ZERO || o.cosine <= T::ZERO {
+            return T::ZERO;
+        }
+        match self.masking {
+            Masking::HeightCorrelated => T::ONE / (T::ONE + self.lambda(i) + self.lambda(o)),
+            Masking::Separable => self.g1(i) * self.g1(o),
+        }
+    }
+
+    /// G2/(4 cos θ_i cos θ_o), which stays finite where the cosines vanish: with r = √(c² + α²s²),
+    /// 1/(2 (c_o r_i + c_i r_o)) height-correlated, 1/((c_i + r_i)(c_o + r_o)) separable.
+    #[must_use]
+    pub fn visibility(&self, i: Incidence<T>, o: Incidence<T>) -> T {
+        if i.cosine <= T::ZERO || o.cosine <= T::ZERO {
+            return T::ZERO;
+        }
+        let (ri, ro) = (self.slant(i), self.slant(o));
+        match self.masking {
+            Masking::HeightCorrelated => T::HALF / (o.cosine * ri + i.cosine * ro).at_least(T::TINY),
+            Masking::Separable => T::ONE / ((i.cosine + ri) * (o.cosine + ro)),
+        }
+    }
+
+    /// ∂/∂α of [`Self::visibility`].
+    #[must_use]
+    pub fn visibility_by_alpha(&self, i: Incidence<T>, o: Incidence<T>) -> T {
+        if i.cosine <= T::ZERO || o.cosine <= T::ZERO {
+            return T::ZERO;
+        }
+        let (wi, wo) = (self.slant_squared(i), self.slant_squared(o));
+        let (ri, ro) = (wi.sqrt(), wo.sqrt());
+        // ∂r/∂α = α s²/r.
+        let (ai, ao) = (self.alpha * i.sine_squared, self.alpha * o.sine_squared);
+        match self.masking {
+            Masking::HeightCorrelated => {
+                let (a, b) = (o.cosine * ri, i.cosine * ro);
+                let sum = (a + b).at_least(T::TINY);
+                -T::HALF * ((a * (ai / wi) + b * (ao / wo)) / sum) / sum
+            }
+            Masking::Separable => {
+                let (a, b) = (i.cosine + ri, o.cosine + ro);
+                -(ai / (ri * a) + ao / (ro * b)) / (a * b)
+            }
+        }
+    }
+
+    /// Density per steradian of h of [`Ggx::sample_visible`]: G1(ω_o) D(h) (ω_o·h)/(n·ω_o). For ω_i mirrored at h divide
     /// by 4 (ω_o·h).
     #[must_use]
-    pub fn visible_density(&self, o: Incidence, h: Incidence, o_dot_h: f64) -> f64 {
-        if o.cosine <= 0.0 {
-            return 0.0;
+    pub fn visible_density(&self, o: Incidence<T>, h: Incidence<T>, o_dot_h: T) -> T {
+        if o.cosine <= T::ZERO {
+            return T::ZERO;
         }
         // G1/c = 2/(c + r) has no pole at grazing.
-        2.0 * self.d(h) * o_dot_h.max(0.0) / (o.cosine + self.slant(o))
+        T::TWO * self.d(h) * o_dot_h.at_least(T::ZERO) / (o.cosine + self.slant(o))
     }
 
     /// G2/G1(ω_o), the weight f_r (n·ω_i)/density of a sampled visible normal, in [0, 1]; finite at grazing ω_o.
     #[must_use]
-    pub fn visible_weight(&self, i: Incidence, o: Incidence) -> f64 {
-        2.0 * i.cosine * (o.cosine + self.slant(o)) * self.visibility(i, o)
+    pub fn visible_weight(&self, i: Incidence<T>, o: Incidence<T>) -> T {
+        T::TWO * i.cosine * (o.cosine + self.slant(o)) * self.visibility(i, o)
+    }
+
+    /// αc² + s²/α = 1/√(πD), which has fewer roundings than α²c² + s².
+    fn spread(&self, h: Incidence<T>) -> T {
+        (self.alpha * (h.cosine * h.cosine) + h.sine_squared / self.alpha).at_least(T::HALF * self.alpha)
     }
 
     /// r = √(c² + α²s²) = c (1 + 2Λ).
-    fn slant(&self, v: Incidence) -> f64 {
-        (v.cosine * v.cosine + self.alpha * self.alpha * v.sine_squared).sqrt()
+    fn slant(&self, v: Incidence<T>) -> T {
+        (v.cosine * v.cosine + self.alpha * self.alpha * v.sine_squared).sqrt().at_least(T::HALF * self.alpha)
+    }
+
+    /// r² rounded once, for derivatives: they divide by r three times.
+    fn slant_squared(&self, v: Incidence<T>) -> T {
+        let (c2, c2_low) = v.cosine.product(v.cosine);
+        let (a2, a2_low) = self.alpha.product(self.alpha);
+        let (t2, t2_low) = a2.product(v.sine_squared);
+        let (sum, low) = c2.sum(t2);
+        (sum + (low + (c2_low + (t2_low + a2_low * v.sine_squared)))).at_least((T::HALF * self.alpha).squared())
     }
 }

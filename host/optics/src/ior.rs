@@ -2,20 +2,21 @@
 //!
 //! η = n + ik with k >= 0 absorbing and fields exp(−iωt); light arrives from vacuum.
 
-use crate::OpticsError;
+use crate::real::single;
+use crate::{OpticsError, Real};
 
 /// Largest index accepted: no optical medium comes near, and everything stays far from overflow below it.
 pub const MAX_INDEX: f64 = 1e3;
 
 /// Refractive index of a transparent medium, in [1, 1000].
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
-pub struct Dielectric(f64);
+pub struct Dielectric<T = f64>(T);
 
 /// Refractive index n + ik of an absorbing medium, 0 < n, k <= 1000.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Conductor {
-    n: f64,
-    k: f64,
+pub struct Conductor<T = f64> {
+    n: T,
+    k: T,
 }
 
 /// A refractive index.
@@ -36,10 +37,23 @@ impl Dielectric {
         if (1.0..=MAX_INDEX).contains(&eta) { Ok(Self(eta)) } else { Err(OpticsError::Index { n: eta, k: 0.0 }) }
     }
 
+    /// The nearest index in f32, for lanes.
+    #[must_use]
+    pub fn single(self) -> Dielectric<f32> {
+        Dielectric(single(self.0))
+    }
+}
+
+impl<T: Real> Dielectric<T> {
     /// η.
     #[must_use]
-    pub fn eta(self) -> f64 {
+    pub fn eta(self) -> T {
         self.0
+    }
+
+    /// η found by an inverse, if it is in the range of [`Dielectric::new`].
+    pub(crate) fn found(eta: T) -> Option<Self> {
+        (1.0..=MAX_INDEX).contains(&eta.into()).then_some(Self(eta))
     }
 }
 
@@ -53,15 +67,23 @@ impl Conductor {
         if fits(n) && fits(k) { Ok(Self { n, k }) } else { Err(OpticsError::Index { n, k }) }
     }
 
+    /// The nearest index in f32, for lanes. An n or k below 1e-38 becomes a subnormal number or 0.
+    #[must_use]
+    pub fn single(self) -> Conductor<f32> {
+        Conductor { n: single(self.n), k: single(self.k) }
+    }
+}
+
+impl<T: Real> Conductor<T> {
     /// Real part.
     #[must_use]
-    pub fn n(self) -> f64 {
+    pub fn n(self) -> T {
         self.n
     }
 
     /// Imaginary part (extinction coefficient).
     #[must_use]
-    pub fn k(self) -> f64 {
+    pub fn k(self) -> T {
         self.k
     }
 }

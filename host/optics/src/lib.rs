@@ -1,4 +1,5 @@
-//! The physics that simulator and fit share: Fresnel, GGX, the sky, and paper eq. 6 evaluated. f64 throughout.
+//! The physics that simulator and fit share: Fresnel, GGX, the sky, and paper eq. 6 evaluated. f64 throughout;
+//! the pointwise functions of [`fresnel`] and [`ggx`] in f32 too, for lanes (`single()` of a validated f64 value).
 //!
 //! Conventions (docs/CONVENTIONS.md):
 //! - Directions are unit [`glam::DVec3`] in the world (sample in z = 0, mean normal +z) and point away from the surface:
@@ -33,6 +34,8 @@ pub mod ggx;
 pub mod integral;
 pub mod ior;
 pub mod materials;
+pub mod prefilter;
+mod real;
 pub mod sky;
 pub mod trs;
 
@@ -42,4 +45,5 @@ pub use error::OpticsError;
 pub use frames::{Frame, Incidence, Turn};
 pub use ggx::{Ggx, Masking};
 pub use ior::{Conductor, Dielectric, Ior};
+pub use real::Real;
 pub use sky::Light;

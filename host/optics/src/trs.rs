@@ -52,12 +52,18 @@ impl Sinusoid {
 
 impl MirrorFacet {
     /// Stokes of the reflected light in the camera frame, M_rot(φ) M_ref M_rot(ψ_i) L [1, P, 0, 0] (paper eq. 8).
+    ///
+    /// s0 = I⊥ + I∥ and not a product with ½(R⊥ ± R∥), which would cancel where light polarized across the s axis meets the
+    /// Brewster angle.
     #[must_use]
     pub fn stokes(&self) -> Stokes {
-        Mueller::rotation(self.phi)
-            .after(&Mueller::reflection(self.reflectance))
-            .after(&Mueller::rotation(self.psi))
-            .apply(Stokes([self.radiance, self.radiance * self.dolp, 0.0, 0.0]))
+        let [perpendicular, parallel] = self.components();
+        let (_, s) = self.psi.cos_sin_double();
+        let across = self.radiance * self.dolp * s;
+        let Reflectance { rr_cos_delta, rr_sin_delta, .. } = self.reflectance;
+        let in_plane =
+            [perpendicular + parallel, perpendicular - parallel, rr_cos_delta * across, -rr_sin_delta * across];
+        Mueller::rotation(self.phi).apply(Stokes(in_plane))
     }
 
     /// (I⊥, I∥) = (½ L R⊥ (1 + P cos 2ψ_i), ½ L R∥ (1 − P cos 2ψ_i)): reflected power along the s axis and across it.

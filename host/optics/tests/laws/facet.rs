@@ -173,6 +173,75 @@ proptest! {
         }
     }
 
+    /// The same in 4 × 4, M(ω_o → ω_i) = Q M(ω_i → ω_o)ᵀ Q with Q = diag(1, 1, −1, 1), and below the interface.
+    #[test]
+    fn reciprocity_of_the_full_matrix_and_of_the_body(
+        wi in above(), wo in above(), ior in index(), alpha in 0.01..1.0_f64, roll in 0.0..6.0_f64, eta in 1.0..3.0_f64,
+    ) {
+        let surface = Microfacet { ior, ggx: correlated(alpha) };
+        let (incident, outgoing) = frames(wi, wo, roll);
+        let (from, to) = (Frame::incident(wo, outgoing.x).unwrap(), Frame::camera(wi, incident.x).unwrap());
+        let forth = surface.mueller(wi, &incident, wo, &outgoing, DVec3::Z).0;
+        let back = surface.mueller(wo, &from, wi, &to, DVec3::Z).0;
+        let q = [1.0, 1.0, -1.0, 1.0];
+        for r in 0..4 {
+            for c in 0..4 {
+                prop_assert!((forth[r][c] - q[r] * q[c] * back[c][r]).abs() <= 1e-9 * forth[0][0], "{forth:?} {back:?}");
+            }
+        }
+        let body = PolarizedDiffuse { ior: Dielectric::new(eta).unwrap(), albedo: 0.6 };
+        let forth = body.linear(wi, &incident, wo, &outgoing, DVec3::Z).0;
+        let back = body.linear(wo, &from, wi, &to, DVec3::Z).0;
+        for r in 0..3 {
+            for c in 0..3 {
+                prop_assert!((forth[r][c] - q[r] * q[c] * back[c][r]).abs() <= 1e-13 * forth[0][0], "{forth:?} {back:?}");
+            }
+        }
+    }
+
+    /// Realizable: Cloude's coherency matrix of M_ref (Gil and Ossikovski, "Polarized Light and the Mueller Matrix Approach",
+    /// 5.3) is that of one Jones matrix, so tr(MᵀM) = 4 M00²; and light of any polarization, s3 included, stays physical.
+    #[test]
+    fn a_reflection_is_one_jones_matrix(
+        wi in above(), wo in above(), ior in index(), alpha in roughness(), roll in 0.0..6.0_f64,
+        psi in -2.0..2.0_f64, chi in -0.8..0.8_f64,
+    ) {
+        let (incident, outgoing) = frames(wi, wo, roll);
+        let surface = Microfacet { ior, ggx: correlated(alpha) };
+        let m = surface.mueller(wi, &incident, wo, &outgoing, DVec3::Z);
+        let m00 = m.0[0][0];
+        let trace: f64 = m.0.iter().flatten().map(|x| (x / m00.max(1e-280)).powi(2)).sum();
+        prop_assert!(m00 < 1e-200 || (trace - 4.0).abs() < 1e-12, "{m:?}");
+        let light = [1.0, (2.0 * chi).cos() * (2.0 * psi).cos(), (2.0 * chi).cos() * (2.0 * psi).sin(), (2.0 * chi).sin()];
+        let [s0, s1, s2, s3] = m.apply(protocol_polar::Stokes(light)).0;
+        prop_assert!((s1.hypot(s2).hypot(s3) - s0).abs() <= 1e-12 * m00, "what was fully polarized stays so");
+    }
+
+    /// World, camera and light turned together change nothing.
+    #[test]
+    fn the_world_may_turn(
+        wi in above(), wo in above(), ior in index(), alpha in 0.05..1.0_f64, roll in 0.0..6.0_f64,
+        axis in above(), angle in -3.0..3.0_f64,
+    ) {
+        let turn = glam::DQuat::from_axis_angle(axis, angle);
+        let turned = |f: &Frame| Frame { x: turn * f.x, y: turn * f.y };
+        let (incident, outgoing) = frames(wi, wo, roll);
+        let surface = Microfacet { ior, ggx: correlated(alpha) };
+        let here = surface.linear(wi, &incident, wo, &outgoing, DVec3::Z);
+        let there = surface.linear(turn * wi, &turned(&incident), turn * wo, &turned(&outgoing), turn * DVec3::Z);
+        let body = PolarizedDiffuse { ior: Dielectric::new(1.5).unwrap(), albedo: 0.6 };
+        let below = body.linear(wi, &incident, wo, &outgoing, DVec3::Z);
+        let below_there = body.linear(turn * wi, &turned(&incident), turn * wo, &turned(&outgoing), turn * DVec3::Z);
+        // Cosines are known to 1e-16, and 1e-6 is the least of them; an axis across both beams has the same as its error.
+        let across = (wi - wo).cross(wi + wo).length();
+        prop_assume!(wi.z > 1e-3 && wo.z > 1e-3 && across > 1e-3);
+        for (a, b, scale) in [(here, there, here.0[0][0]), (below, below_there, below.0[0][0])] {
+            for (x, y) in a.0.iter().flatten().zip(b.0.iter().flatten()) {
+                prop_assert!((x - y).abs() <= 1e-9 * scale, "{a:?} {b:?}");
+            }
+        }
+    }
+
     /// Turning the incident frame along with the light, or the camera, changes nothing but the frame of the answer.
     #[test]
     fn frames_do_not_matter(wi in above(), wo in above(), ior in index(), a in -3.0..3.0_f64, b in -3.0..3.0_f64) {

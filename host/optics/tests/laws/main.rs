@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "inputs are inside the model by construction")]
 
 mod facet;
+mod finite;
 mod fresnel;
 mod integral;
 mod sky;

@@ -45,6 +45,35 @@ fn eq_9_as_printed_is_wrong() {
 }
 
 proptest! {
+    /// As printed, eq. 9 is off by L P √(R⊥R∥) |cos δ sin 2ψ_i| at its worst polarizer angle: both times of its last term.
+    #[test]
+    fn eq_9_as_printed_is_off_by_twice_its_last_term(
+        eta in 1.05..2.5_f64, theta in 0.1..1.5_f64, p in 0.1..=1.0_f64, psi in -3.0..3.0_f64, phi in -3.0..3.0_f64,
+    ) {
+        let f = facet(eta, theta, p, psi, phi);
+        let printed = |po: f64| {
+            let [s, q] = f.components();
+            let (c2, s2) = ((2.0 * (po - phi)).cos(), (2.0 * (po - phi)).sin());
+            let root = (f.reflectance.perpendicular * f.reflectance.parallel).sqrt();
+            let delta = if theta < eta.atan() { -1.0 } else { 1.0 };
+            0.5 * (s + q) + 0.5 * (s - q) * c2 - 0.5 * f.radiance * p * root * delta * (2.0 * psi).sin() * s2
+        };
+        let worst = phi + 0.25 * PI;
+        let off = printed(worst) - f.stokes().through_polarizer(Radians(worst));
+        let expected = -f.radiance * p * f.reflectance.rr_cos_delta * (2.0 * psi).sin();
+        prop_assert!((off - expected).abs() < 1e-13, "{off} {expected}");
+    }
+
+    /// Malus: what a mirror at its Brewster angle leaves of any light is linear along φ and passes as cos².
+    #[test]
+    fn a_polarizer_passes_the_square_of_the_cosine(
+        eta in 1.05..2.5_f64, p in 0.0..=1.0_f64, psi in -3.0..3.0_f64, phi in -3.0..3.0_f64, po in -3.0..3.0_f64,
+    ) {
+        let f = facet(eta, eta.atan(), p, psi, phi);
+        let s0 = f.stokes().0[0];
+        prop_assert!((f.radiance(Radians(po)) - s0 * (po - phi).cos().powi(2)).abs() < 1e-13, "at {po}");
+    }
+
     #[test]
     fn eq_9_with_its_sign_corrected_is_the_mueller_product(
         eta in 1.0..2.5_f64, theta in 0.0..1.57_f64, p in 0.0..=1.0_f64, psi in -3.0..3.0_f64, phi in -3.0..3.0_f64,

@@ -1,16 +1,19 @@
 //! The worst error, in units in the last place, of every pointwise function that simulator and fit share.
 //!
-//! Inputs are taken as the f64 they are, angles of incidence as the pair (cos θ, sin² θ) the functions get; the exact value is
+//! Inputs are taken as the f64 or f32 they are, angles of incidence as the pair (cos θ, sin² θ) the functions get; the exact value is
 //! the textbook form in 256 bits ([`exact`]). Points fill each domain evenly in the coordinates of [`functions`], dense at its
 //! edges, and then close in on the worst one found: a search, not a proof. It has no random numbers: every run looks at the
 //! same points.
 
+mod domain;
 mod exact;
+mod facets;
+mod fresnel;
 mod functions;
 
 use crate::process;
 use anyhow::{Context, Result, bail};
-use functions::{FUNCTIONS, Function};
+use functions::{FUNCTIONS, Function, Type};
 use rayon::prelude::*;
 
 const FILE: &str = "docs/NUMERICS.md";
@@ -29,13 +32,14 @@ struct Worst {
 
 /// Searches every function, prints the table, writes it into the document if asked, and fails above the bound.
 pub(crate) fn run(write: bool) -> Result<String> {
-    let found: Vec<(&Function, Worst)> = FUNCTIONS.par_iter().map(|f| (f, search(f, POINTS))).collect();
+    let cases: Vec<(Function, Type)> = cases().collect();
+    let found: Vec<Worst> = cases.par_iter().map(|(f, t)| search(f, *t, POINTS)).collect();
     let mut table =
-        String::from("\n| function | domain | unit | worst, ulp | allowed | at |\n|---|---|---|---|---|---|\n");
-    for (function, worst) in &found {
-        let Function { name, domain, unit, bound, place, .. } = function;
-        let (ulp, at) = (tenths_up(worst.ulp), place(worst.point));
-        table += &format!("| {name} | {domain} | {unit} | {ulp:.1} | {bound} | {at} |\n");
+        String::from("\n| function | type | domain | unit | worst, ulp | at |\n|---|---|---|---|---|---|\n");
+    for ((function, in_type), worst) in cases.iter().zip(&found) {
+        let (ulp, at) = (tenths_up(worst.ulp), function.place(*in_type, worst.point));
+        let (name, unit, domain) = (function.name, function.unit, function.domain(*in_type));
+        table += &format!("| {name} | {} | {domain} | {unit} | {ulp:.1} | {at} |\n", in_type.name());
     }
     table.push('\n');
     print!("{table}");
@@ -47,16 +51,24 @@ pub(crate) fn run(write: bool) -> Result<String> {
         let (_, after) = rest.split_once(END).with_context(no_markers)?;
         std::fs::write(&path, format!("{before}{BEGIN}\n{table}{END}{after}")).with_context(|| FILE.to_owned())?;
     }
-    let beyond: Vec<&str> = found.iter().filter(|(f, worst)| worst.ulp > f.bound).map(|(f, _)| f.name).collect();
+    let beyond: Vec<String> = (cases.iter().zip(&found))
+        .filter(|((_, in_type), worst)| worst.ulp > in_type.bound())
+        .map(|((function, in_type), worst)| format!("{} ({}): {:.2}", function.name, in_type.name(), worst.ulp))
+        .collect();
     if !beyond.is_empty() {
         bail!("more ulp than allowed: {}", beyond.join(", "));
     }
-    Ok(format!("{} functions within their bounds{}", found.len(), if write { ", table written" } else { "" }))
+    Ok(format!("{} searches within their bounds{}", found.len(), if write { ", table written" } else { "" }))
+}
+
+/// Every function in every type it exists in.
+fn cases() -> impl Iterator<Item = (Function, Type)> {
+    FUNCTIONS.into_iter().flat_map(|function| function.types().iter().map(move |in_type| (function, *in_type)))
 }
 
 /// The worst of `points` points of the whole domain and as many again around the worst.
-fn search(function: &Function, points: u32) -> Worst {
-    let error = |point: [f64; 3]| Worst { ulp: (function.error)(point).unwrap_or(0.0), point };
+fn search(function: &Function, in_type: Type, points: u32) -> Worst {
+    let error = |point: [f64; 3]| Worst { ulp: function.error(in_type, point).unwrap_or(0.0), point };
     let worse = |a: Worst, b: Worst| if b.ulp > a.ulp { b } else { a };
     let edges = (0..343).map(|k| [k % 7, k / 7 % 7, k / 49].map(|digit| f64::from(digit) / 6.0));
     let first = edges.chain((0..points).map(spread)).map(error).fold(Worst { ulp: 0.0, point: [0.0; 3] }, worse);
@@ -87,13 +99,14 @@ mod tests {
 
     #[test]
     fn every_function_is_within_its_bound() {
-        for function in &FUNCTIONS {
-            let worst = search(function, 1000);
-            let place = (function.place)(worst.point);
+        for (function, in_type) in cases() {
+            let worst = search(&function, in_type, 500);
+            let place = function.place(in_type, worst.point);
             assert!(
-                worst.ulp > 0.3 && worst.ulp <= function.bound,
-                "{}: {:.2} ulp at {place}",
+                worst.ulp > 0.3 && worst.ulp <= in_type.bound(),
+                "{} ({}): {:.2} ulp at {place}",
                 function.name,
+                in_type.name(),
                 worst.ulp
             );
         }
@@ -103,9 +116,14 @@ mod tests {
     fn a_wrong_last_place_is_seen() {
         let third = exact::big(1.0) / exact::big(3.0);
         let nearest = 1.0 / 3.0_f64;
-        assert!(exact::ulps(nearest, &third, None) <= 0.5);
-        let off = exact::ulps(nearest.next_up().next_up(), &third, None);
+        assert!(exact::ulps(nearest, &third, &third) <= 0.5);
+        let off = exact::ulps(nearest.next_up().next_up(), &third, &third);
         assert!((1.5..=2.5).contains(&off), "{off}");
-        assert!((exact::ulps(1e-20, &exact::big(0.0), Some(1.0)) - 1e-20 / f64::EPSILON).abs() < 1e-6);
+        let nearest = 1.0 / 3.0_f32;
+        assert!(exact::ulps(nearest, &third, &third) <= 0.5);
+        let off = exact::ulps(nearest.next_down().next_down(), &third, &third);
+        assert!((1.5..=2.5).contains(&off), "{off}");
+        let of_one = exact::ulps(1e-20, &exact::big(0.0), &exact::big(1.0));
+        assert!((of_one - 1e-20 / f64::EPSILON).abs() < 1e-6);
     }
 }
