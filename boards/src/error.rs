@@ -1,20 +1,8 @@
 //! What can be wrong with a board file, and where.
 
-use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use crate::locate;
-
-/// Where in which file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
-    /// The file as the caller named it.
-    pub file: PathBuf,
-    /// Line, counted from 1. A key that is missing has the line of the table it belongs in.
-    pub line: usize,
-    /// Dotted key, such as `wheel.servo.pulse_min_us`; empty where the text is not yet a key.
-    pub key: String,
-}
+use crate::locate::{Fault, FaultKind, Place};
 
 /// Why a board file was refused.
 #[derive(Debug, thiserror::Error)]
@@ -74,25 +62,12 @@ pub enum BoardError {
     },
 }
 
-impl BoardError {
-    /// Gives a parser error its file, line and key, and its kind.
-    pub(crate) fn from_toml(file: &Path, text: &str, error: &toml::de::Error) -> Self {
-        let place = locate::place_at(file, text, error.span().map_or(0, |span| span.start));
-        let expected = error.message().to_owned();
-        // toml has no error kinds; these two openings are serde's own (`de::Error::unknown_field`, `unknown_variant`).
-        if expected.starts_with("unknown field") {
-            Self::UnknownKey { place, expected }
-        } else if expected.starts_with("unknown variant") {
-            Self::UnknownValue { place, expected }
-        } else {
-            Self::Parse { place, expected }
+impl From<Fault> for BoardError {
+    fn from(Fault { kind, place, expected }: Fault) -> Self {
+        match kind {
+            FaultKind::Malformed => Self::Parse { place, expected },
+            FaultKind::UnknownKey => Self::UnknownKey { place, expected },
+            FaultKind::UnknownValue => Self::UnknownValue { place, expected },
         }
-    }
-}
-
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}", self.file.display(), self.line)?;
-        if self.key.is_empty() { Ok(()) } else { write!(f, ": `{}`", self.key) }
     }
 }

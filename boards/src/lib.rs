@@ -8,12 +8,15 @@
 
 mod check;
 mod error;
-mod locate;
+pub mod locate;
 mod schema;
 
 use std::path::Path;
 
-pub use error::{BoardError, Place};
+use locate::Fault;
+
+pub use error::BoardError;
+pub use locate::Place;
 pub use schema::{
     Approach, Bayer, Board, BoardKind, Emulation, Encoder, EncoderChip, Identity, Memory, Polarizer, Sensor, Servo,
     Stokes, StokesWord, Usb, Wheel,
@@ -49,7 +52,7 @@ impl Board {
     /// [`BoardError::UnknownKey`] or [`BoardError::UnknownValue`] for what does not fit the schema, then
     /// [`BoardError::OutOfRange`] for the first value outside its range.
     pub fn parse(text: &str, file: &Path) -> Result<Self, BoardError> {
-        let located = |e: toml::de::Error| BoardError::from_toml(file, text, &e);
+        let located = |e: toml::de::Error| BoardError::from(Fault::new(file, text, &e));
         let SchemaOnly { schema } = toml::from_str(text).map_err(located)?;
         if schema != SCHEMA {
             let place = locate::place_of_key(file, text, "schema");
