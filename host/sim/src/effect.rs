@@ -1,13 +1,30 @@
-//! The effects between a perfect Stokes image and a camera's frames, and what is said of each before it is simulated.
+//! The effects between a scene and a camera's frames, and what is said of each before it is simulated.
+//!
+//! Two halves: optical effects decide which Stokes image the scene sends into the camera ([`crate::optical::OpticalFacts`]
+//! assesses them), effects of capture and sensor what frames the camera makes of it ([`crate::Facts`] does).
 
-use crate::Facts;
-use crate::capture::{backlash, beam_shift, extinction, light_drift, psf, vignetting, wheel_error};
-use crate::sensor::{bayer, dark, prnu, quantization, read, saturation, shot};
-
-/// Something that makes a frame differ from ½ t (s0 + s1 cos 2φ + s2 sin 2φ).
+/// Something that a simulation can be made with or without.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Effect {
+    /// The sky's polarization has four neutral points; else two.
+    NeutralPoints,
+    /// Light is polarized before it meets the surface.
+    IncidentPolarization,
+    /// Metals shift phase between the polarizations.
+    Retardance,
+    /// The sun has a disk; else all of it comes from its center.
+    SunDisk,
+    /// Facets hide each other.
+    Masking,
+    /// Facets spread the reflection; else every pixel is a mirror.
+    Roughness,
+    /// Normals differ from the mean of their surface.
+    NormalVariation,
+    /// The body's light leaves through the interface partly polarized.
+    DiffusePolarization,
+    /// Light enters the body and comes out again.
+    Diffuse,
     /// The light changes while the wheel turns.
     LightDrift,
     /// The wheel rests beside where it was sent.
@@ -16,6 +33,8 @@ pub enum Effect {
     Backlash,
     /// The polarizer passes some of what it should stop.
     Extinction,
+    /// A sheet polarizer's axis turns with the angle of a ray off the optical axis.
+    SheetAxis,
     /// The polarizer's wedge moves the picture about.
     BeamShift,
     /// The corners of the picture are darker.
@@ -43,13 +62,13 @@ pub enum Effect {
 pub struct Assessment {
     /// Whether the scene has it at all.
     pub applies: bool,
-    /// Most that any Stokes component, got from the frames with the commanded angles and an ideal polarizer, changes when the
-    /// effect is left out, relative to s0 of its photosite. Over all photosites that count ([`Facts`]), for the effect by
-    /// itself: two together may add a term of second order. For noise it is exceeded at a photosite with a probability below
-    /// 1e-6 per component.
+    /// Most that any Stokes component changes when the effect is left out, relative to the s0 the pixel has with it; of capture
+    /// and sensor for Stokes got from the frames with the commanded angles and an ideal polarizer. Over all pixels that count
+    /// ([`crate::Facts`]), for the effect by itself: two together may add a term of second order. For noise it is exceeded at a
+    /// photosite with a probability below 1e-6 per component.
     pub bound: f64,
-    /// Time to simulate it, per pixel of each frame, on one core of the machine it was measured on (2-core x86-64 virtual
-    /// machine): good for comparing effects, not for promising times.
+    /// Estimated time to simulate it, per pixel (of each frame), on one core of the machine it was measured on (2-core x86-64
+    /// virtual machine): good for comparing effects, not for promising times.
     pub cost_ns_per_pixel: f64,
     /// The numbers behind it, for people.
     pub reason: String,
@@ -60,12 +79,27 @@ pub struct Assessment {
 pub struct EffectSet(u32);
 
 impl Effect {
-    /// All of them, in the order the light meets them.
-    pub const ALL: [Self; 14] = [
+    /// Those between a scene and its noise-free Stokes image, in the order in which a planner leaves them out: a bound of one may
+    /// use that those before it are gone.
+    pub const OPTICAL: [Self; 9] = [
+        Self::NeutralPoints,
+        Self::IncidentPolarization,
+        Self::Retardance,
+        Self::SunDisk,
+        Self::Masking,
+        Self::Roughness,
+        Self::NormalVariation,
+        Self::DiffusePolarization,
+        Self::Diffuse,
+    ];
+
+    /// Those between a Stokes image and frames, in the order the light meets them.
+    pub const CAPTURE: [Self; 15] = [
         Self::LightDrift,
         Self::WheelError,
         Self::Backlash,
         Self::Extinction,
+        Self::SheetAxis,
         Self::BeamShift,
         Self::Vignetting,
         Self::Psf,
@@ -82,10 +116,20 @@ impl Effect {
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
+            Self::NeutralPoints => "neutral-points",
+            Self::IncidentPolarization => "incident-polarization",
+            Self::Retardance => "retardance",
+            Self::SunDisk => "sun-disk",
+            Self::Masking => "masking",
+            Self::Roughness => "roughness",
+            Self::NormalVariation => "normal-variation",
+            Self::DiffusePolarization => "diffuse-polarization",
+            Self::Diffuse => "diffuse",
             Self::LightDrift => "light-drift",
             Self::WheelError => "wheel-error",
             Self::Backlash => "backlash",
             Self::Extinction => "extinction",
+            Self::SheetAxis => "sheet-axis",
             Self::BeamShift => "beam-shift",
             Self::Vignetting => "vignetting",
             Self::Psf => "psf",
@@ -96,27 +140,6 @@ impl Effect {
             Self::Quantization => "quantization",
             Self::Saturation => "saturation",
             Self::Bayer => "bayer",
-        }
-    }
-
-    /// What leaving it out would change. The proof of each bound stands with the effect's own file.
-    #[must_use]
-    pub fn assess(self, facts: &Facts<'_>) -> Assessment {
-        match self {
-            Self::LightDrift => light_drift::assess(facts),
-            Self::WheelError => wheel_error::assess(facts),
-            Self::Backlash => backlash::assess(facts),
-            Self::Extinction => extinction::assess(facts),
-            Self::BeamShift => beam_shift::assess(facts),
-            Self::Vignetting => vignetting::assess(facts),
-            Self::Psf => psf::assess(facts),
-            Self::Shot => shot::assess(facts),
-            Self::Read => read::assess(facts),
-            Self::Dark => dark::assess(facts),
-            Self::Prnu => prnu::assess(facts),
-            Self::Quantization => quantization::assess(facts),
-            Self::Saturation => saturation::assess(facts),
-            Self::Bayer => bayer::assess(facts),
         }
     }
 }
@@ -132,11 +155,8 @@ impl EffectSet {
     /// None.
     pub const NONE: Self = Self(0);
 
-    /// Every effect.
-    #[must_use]
-    pub fn all() -> Self {
-        Effect::ALL.into_iter().fold(Self::NONE, Self::with)
-    }
+    /// Every effect, of both halves.
+    pub const ALL: Self = Self((1 << (Effect::OPTICAL.len() + Effect::CAPTURE.len())) - 1);
 
     /// With `effect` as well.
     #[must_use]
@@ -163,12 +183,14 @@ mod tests {
 
     #[test]
     fn every_effect_has_its_own_place_and_name() {
-        for effect in Effect::ALL {
+        let every = || Effect::OPTICAL.into_iter().chain(Effect::CAPTURE);
+        for effect in every() {
             let alone = EffectSet::NONE.with(effect);
-            assert_eq!(Effect::ALL.iter().filter(|e| alone.contains(**e)).collect::<Vec<_>>(), [&effect]);
+            assert_eq!(every().filter(|e| alone.contains(*e)).collect::<Vec<_>>(), [effect]);
             assert_eq!(alone.without(effect), EffectSet::NONE);
-            assert_eq!(Effect::ALL.iter().filter(|e| e.name() == effect.name()).count(), 1);
+            assert_eq!(every().filter(|e| e.name() == effect.name()).count(), 1);
         }
-        assert!(Effect::ALL.into_iter().all(|e| EffectSet::all().contains(e)));
+        assert_eq!(every().fold(EffectSet::ALL, EffectSet::without), EffectSet::NONE);
+        assert_eq!(every().fold(EffectSet::NONE, EffectSet::with), EffectSet::ALL);
     }
 }

@@ -1,22 +1,10 @@
 //! What can be wrong with a scene, and where.
 
-use std::fmt;
 use std::path::PathBuf;
 
+use boards::Place;
 use host_image::ImageError;
 use host_optics::OpticsError;
-
-/// Where in which scene file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
-    /// The file as the caller named it.
-    pub file: PathBuf,
-    /// Line, counted from 1. A key that is missing has the line of the table it belongs in.
-    pub line: usize,
-    /// Dotted key, such as `camera.full_well_e` or `view.1.theta_deg` (tables of a list count from 0); empty where the text
-    /// is not yet a key.
-    pub key: String,
-}
 
 /// Why a scene was refused or could not be simulated.
 #[derive(Debug, thiserror::Error)]
@@ -91,10 +79,10 @@ pub enum SimError {
         source: OpticsError,
     },
     /// Unsupported: the scene is sound, but holds what is not simulated.
-    #[error("`{key}` is not simulated: {why}")]
+    #[error("{place}: not simulated: {why}")]
     NotSimulated {
-        /// Dotted key in the scene.
-        key: String,
+        /// Where.
+        place: Place,
         /// What cannot be done.
         why: String,
     },
@@ -133,11 +121,4 @@ pub enum SimError {
     /// Polarizer angles that do not determine a Stokes vector.
     #[error("the polarizer angles of the plan do not determine a Stokes vector: {0:?}")]
     Angles(protocol_polar::SolveError),
-}
-
-impl fmt::Display for Place {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}", self.file.display(), self.line)?;
-        if self.key.is_empty() { Ok(()) } else { write!(f, ": `{}`", self.key) }
-    }
 }

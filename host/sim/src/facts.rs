@@ -9,10 +9,12 @@
 use host_image::StokesImage;
 use protocol_polar::{Analyzer, LeastSquares};
 
+use crate::capture::{backlash, beam_shift, extinction, light_drift, psf, sheet_axis, vignetting, wheel_error};
 use crate::frames::{FrameSpec, schedule};
 use crate::scene::Scene;
+use crate::sensor::{bayer, dark, prnu, quantization, read, saturation, shot};
 use crate::signal::{Band, Signal, checked, grey};
-use crate::{EffectSet, SimError};
+use crate::{Assessment, Effect, EffectSet, SimError};
 
 /// Photosites below this share of their band's brightest do not count: relative to next to no light every change is large.
 pub(crate) const DARKEST_SHARE: f32 = 1e-3;
@@ -46,7 +48,7 @@ impl<'a> Facts<'a> {
     /// [`SimError::Angles`].
     pub fn new(scene: &'a Scene, view: usize, image: &StokesImage) -> Result<Self, SimError> {
         checked(scene, view, image)?;
-        let signal = Signal::new(&scene.camera, image, EffectSet::all());
+        let signal = Signal::new(&scene.camera, image, EffectSet::ALL);
         let frames = schedule(scene, image)?;
         let ideal: Vec<Analyzer> = scene.plan.angles.iter().map(|a| Analyzer::ideal(*a)).collect();
         let solved = LeastSquares::new(&ideal).map_err(SimError::Angles)?;
@@ -67,6 +69,30 @@ impl<'a> Facts<'a> {
         }
         let grey = grey(&scene.camera, image);
         Ok(Self { scene, view, frames, signal, grey, weights, max_dolp, dark, bright })
+    }
+
+    /// What leaving an effect of capture or sensor out would change; `None` of an optical one. The proof of each bound stands
+    /// with the effect's own file.
+    #[must_use]
+    pub fn assess(&self, effect: Effect) -> Option<Assessment> {
+        Some(match effect {
+            Effect::LightDrift => light_drift::assess(self),
+            Effect::WheelError => wheel_error::assess(self),
+            Effect::Backlash => backlash::assess(self),
+            Effect::Extinction => extinction::assess(self),
+            Effect::SheetAxis => sheet_axis::assess(self),
+            Effect::BeamShift => beam_shift::assess(self),
+            Effect::Vignetting => vignetting::assess(self),
+            Effect::Psf => psf::assess(self),
+            Effect::Shot => shot::assess(self),
+            Effect::Read => read::assess(self),
+            Effect::Dark => dark::assess(self),
+            Effect::Prnu => prnu::assess(self),
+            Effect::Quantization => quantization::assess(self),
+            Effect::Saturation => saturation::assess(self),
+            Effect::Bayer => bayer::assess(self),
+            _ => return None,
+        })
     }
 
     /// Throughput t of the polarizer.

@@ -23,8 +23,10 @@ mod sensor;
 mod signal;
 pub mod simulate;
 
+/// Where in which scene file.
+pub use boards::Place;
 pub use effect::{Assessment, Effect, EffectSet};
-pub use error::{Place, SimError};
+pub use error::SimError;
 pub use facts::Facts;
 pub use scene::Scene;
 pub use simulate::simulate;

@@ -7,10 +7,8 @@
 //!
 //! Interpolation errs too. It is measured and not proved; a tenth of the tolerance is kept for it on either side.
 
-use crate::Assessment;
-use crate::optical::{
-    EffectSet, Evaluation, OpticalEffect, OpticalFacts, PixelMap, Renderer, Rendering, SceneLight, Surface,
-};
+use crate::optical::{Evaluation, OpticalFacts, PixelMap, Renderer, Rendering, SceneLight, Surface};
+use crate::{Assessment, Effect, EffectSet};
 use host_optics::OpticsError;
 use std::time::Duration;
 
@@ -31,7 +29,7 @@ pub struct Plan {
     pub evaluation: Evaluation,
     /// At most this is lost by what was left out, relative to s0.
     pub bound: f64,
-    /// One per effect, in [`OpticalEffect::ALL`]'s order.
+    /// One per optical effect, in [`Effect::OPTICAL`]'s order.
     pub rows: Vec<Row>,
 }
 
@@ -39,7 +37,7 @@ pub struct Plan {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// Which.
-    pub effect: OpticalEffect,
+    pub effect: Effect,
     /// What is known of it, given what else is simulated.
     pub assessment: Assessment,
     /// Whether it is simulated.
@@ -78,28 +76,35 @@ impl Plan {
     #[must_use]
     pub fn new(facts: &OpticalFacts<'_>, tolerance: f64) -> Self {
         let budget = tolerance * (1.0 - 2.0 * EVALUATION_SHARE);
-        let alone = OpticalEffect::ALL.map(|effect| (effect, facts.assess(effect, EffectSet::ALL)));
-        let absent: Vec<OpticalEffect> = alone.iter().filter(|(_, a)| !a.applies).map(|(e, _)| *e).collect();
+        let assess = |effect, on| facts.assess(effect, on).map(|assessment| (effect, assessment));
+        let alone: Vec<(Effect, Assessment)> =
+            Effect::OPTICAL.into_iter().filter_map(|effect| assess(effect, EffectSet::ALL)).collect();
+        let absent: Vec<Effect> = alone.iter().filter(|(_, a)| !a.applies).map(|(e, _)| *e).collect();
         let base = absent.iter().fold(EffectSet::ALL, |set, e| set.without(*e));
-        let present: Vec<(OpticalEffect, Assessment)> = alone.into_iter().filter(|(_, a)| a.applies).collect();
+        let present: Vec<&(Effect, Assessment)> = alone.iter().filter(|(_, a)| a.applies).collect();
+        let mut dependent = Vec::new();
         let mut best = (base, 0.0_f64, 0.0_f64);
         for choice in 1..1_u32 << present.len() {
-            let gone = present.iter().enumerate().filter(|(k, _)| choice >> k & 1 != 0).map(|(_, p)| p);
+            let gone = present.iter().enumerate().filter(|(k, _)| choice >> k & 1 != 0).map(|(_, p)| *p);
             let set = gone.clone().fold(base, |set, (e, _)| set.without(*e));
-            // Cheap refusal first: a bound that depends on the rest is only asked for where the others fit.
-            let others = gone.clone().filter(|(e, _)| *e != OpticalEffect::NormalVariation);
+            let saved: f64 = gone.clone().map(|(_, a)| a.cost_ns_per_pixel).sum();
+            // Cheap refusals first: a bound that depends on the rest is only asked for where the others fit.
+            let others = gone.clone().filter(|(e, _)| *e != Effect::NormalVariation);
             let mut growth: f64 = others.map(|(_, a)| 1.0 + a.bound).product();
-            if growth - 1.0 <= budget && !set.contains(OpticalEffect::NormalVariation) && present_in(&present, set) {
-                growth *= 1.0 + facts.assess(OpticalEffect::NormalVariation, set).bound;
+            if growth - 1.0 > budget || saved < best.1 {
+                continue;
             }
-            let saved: f64 = gone.map(|(_, a)| a.cost_ns_per_pixel).sum();
-            if growth - 1.0 <= budget && (saved > best.1 || (saved >= best.1 && growth - 1.0 < best.2)) {
+            if gone.clone().any(|(e, _)| *e == Effect::NormalVariation) {
+                growth *= 1.0 + normal_variation(facts, set, &mut dependent);
+            }
+            if growth - 1.0 <= budget && (saved > best.1 || growth - 1.0 < best.2) {
                 best = (set, saved, growth - 1.0);
             }
         }
         let (effects, _, bound) = best;
-        let row = |effect| {
-            let assessment = facts.assess(effect, effects);
+        let row = |(effect, alone): (Effect, Assessment)| {
+            let chosen = || facts.assess(effect, effects);
+            let assessment = if effect == Effect::NormalVariation { chosen().unwrap_or(alone) } else { alone };
             let on = effects.contains(effect);
             let why = match (on, absent.contains(&effect)) {
                 (false, true) => Why::Absent,
@@ -110,7 +115,8 @@ impl Plan {
             Row { effect, assessment, on, why }
         };
         let evaluation = Evaluation::Prefiltered { tolerance: EVALUATION_SHARE * tolerance };
-        Self { tolerance, effects, evaluation, bound, rows: OpticalEffect::ALL.map(row).into() }
+        let rows = alone.clone().into_iter().map(row).collect();
+        Self { tolerance, effects, evaluation, bound, rows }
     }
 
     /// Renders a view as planned and in full, and compares.
@@ -130,9 +136,16 @@ impl Plan {
     }
 }
 
-/// Whether normal variation is among the effects a scene has and `set` lacks.
-fn present_in(present: &[(OpticalEffect, Assessment)], set: EffectSet) -> bool {
-    present.iter().any(|(e, _)| *e == OpticalEffect::NormalVariation && !set.contains(*e))
+/// The bound of normal variation without what `set` lacks, asked for once per set of what it depends on.
+fn normal_variation(facts: &OpticalFacts<'_>, set: EffectSet, known: &mut Vec<(EffectSet, f64)>) -> f64 {
+    let relevant = [Effect::Roughness, Effect::IncidentPolarization, Effect::Diffuse].into_iter();
+    let key = relevant.filter(|e| set.contains(*e)).fold(EffectSet::NONE, EffectSet::with);
+    if let Some((_, bound)) = known.iter().find(|(k, _)| *k == key) {
+        return *bound;
+    }
+    let bound = facts.assess(Effect::NormalVariation, set).map_or(f64::INFINITY, |a| a.bound);
+    known.push((key, bound));
+    bound
 }
 
 /// Largest and root-mean-square |Δs_k|/s0 of `stokes` against `full`, pixels brighter than a hundredth of their band's mean.

@@ -168,23 +168,112 @@ fn a_map_of_alpha_is_as_good_as_a_constant() {
     }
 }
 
+/// Four fields of a map, one below the other, each held against the same scene with constants: α and η of a dielectric, an index
+/// for each band, and metals with a map of α.
 #[test]
-fn what_is_not_simulated_is_refused_by_its_key() {
-    let disk = "[light.uniform]\nradiance = 1.0\n[light.sun]\nazimuth_deg = 90.0\nelevation_deg = 40.0\n\
-                [light.sun_disk]\nradiance = 1e4";
-    let smooth = parse(&plane("eta = 1.5\nalbedo = 0.0\nalpha = 0.001", disk));
-    let error = simulate(&smooth, 0, 1e-3, false).unwrap_err();
-    assert!(matches!(&error, SimError::NotSimulated { key, .. } if key == "surface.one.alpha"), "{error}");
-
+fn maps_are_as_good_as_constants() {
     let folder = tempfile::tempdir().unwrap();
-    let samples = Samples::F32(vec![1.4, 1.5, 1.6, 1.5]);
+    let fields = |name: &str, values: [[f32; 3]; 4], channels: usize| {
+        let samples = (0..64).flat_map(|row| values[row / 16][..channels].to_vec()).collect();
+        let samples = Samples::F32(samples);
+        let picture = Picture { width: 1, height: 64, channels, samples, encoding: Encoding::Linear };
+        picture.write_exr(&folder.path().join(name)).unwrap();
+    };
+    let etas = [[1.33, 1.5, 1.7], [1.47, 1.52, 1.6], [1.6, 1.61, 1.62], [2.4, 1.9, 1.3]];
+    let alphas = [[0.1; 3], [0.15; 3], [0.22; 3], [0.4; 3]];
+    fields("eta.exr", etas, 1);
+    fields("etas.exr", etas, 3);
+    fields("alpha.exr", alphas, 1);
+    let light = "[light.sun]\nazimuth_deg = 90.0\nelevation_deg = 40.0\n[light.uniform]\nradiance = 1.0\n\
+                 [light.rayleigh]\nmax_dolp = 0.6";
+    let scene = |lines: &str| {
+        let text = plane(&format!("albedo = 0.1\n{lines}"), light).replace("side_m = 4.0", "side_m = 0.5");
+        let text = text.replace("width_px = 64\nheight_px = 48", "width_px = 8\nheight_px = 32");
+        Scene::parse(&text, &folder.path().join("scene.toml")).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let tolerance = 4e-3;
+    let map = |key: &str, file: &str| format!("{key}_map = {{ file = \"{file}\", coding = \"linear\" }}\n");
+    let eta = |k: usize| format!("eta = {}\n", etas[k][0]);
+    let bands = |k: usize| format!("eta = {:?}\n", etas[k]);
+    let alpha = |k: usize| format!("alpha = {}\n", alphas[k][0]);
+    type Constant<'a> = &'a dyn Fn(usize) -> String;
+    let cases: [(String, Constant<'_>); 4] = [
+        (map("eta", "eta.exr") + "alpha = 0.2", &|k| eta(k) + "alpha = 0.2"),
+        (map("eta", "etas.exr") + "alpha = 0.2", &|k| bands(k) + "alpha = 0.2"),
+        (map("eta", "eta.exr") + &map("alpha", "alpha.exr"), &|k| eta(k) + &alpha(k)),
+        ("material = \"gold\"\n".to_owned() + &map("alpha", "alpha.exr"), &|k| {
+            "material = \"gold\"\n".to_owned() + &alpha(k)
+        }),
+    ];
+    for (mapped, constant) in cases {
+        let mapped_scene = scene(&mapped);
+        let found = simulate(&mapped_scene, 0, tolerance, false).unwrap();
+        assert!(found.map_bound > 0.0 && found.map_bound + found.plan.bound <= tolerance, "{mapped}");
+        for k in 0..4 {
+            let expected = simulate(&scene(&constant(k)), 0, tolerance, false).unwrap();
+            let mut compared = 0;
+            for index in (0..found.truth.mask.len()).filter(|i| found.truth.mask[*i] > 0.0) {
+                let same = |a: f32, b: f32| (a - b).abs() < 1e-6;
+                let (a, b) = (&found.truth, &expected.truth);
+                let at_index = a.eta[index].iter().zip(b.eta[index]).all(|(a, b)| same(*a, b));
+                if !(same(a.alpha[index], b.alpha[index]) && at_index) {
+                    continue;
+                }
+                compared += 1;
+                for (a, b) in found.image.colors.iter().zip(&expected.image.colors) {
+                    for (x, y) in [(&a.s0, &b.s0), (&a.s1, &b.s1), (&a.s2, &b.s2)] {
+                        let error = f64::from((x[index] - y[index]).abs() / b.s0[index]);
+                        assert!(error <= 2.0 * tolerance, "{mapped}, field {k}: {error}");
+                    }
+                }
+            }
+            assert!(compared >= 8, "{mapped}, field {k}: {compared} pixels");
+        }
+    }
+}
+
+/// A picture says which metal is where: the surfaces of an index map have materials of their own.
+#[test]
+fn metals_lie_where_an_index_map_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture =
+        Picture { width: 2, height: 1, channels: 1, samples: Samples::U8(vec![0, 1]), encoding: Encoding::Linear };
+    picture.write_png(&folder.path().join("metals.png")).unwrap();
+    let light = "[light.uniform]\nradiance = 1.0";
+    let of = |material: &str| format!("material = \"{material}\"\nalbedo = 0.0\nalpha = 0.2");
+    let small = |text: String| {
+        let text = text.replace("width_px = 64\nheight_px = 48", "width_px = 16\nheight_px = 12");
+        Scene::parse(&text, &folder.path().join("scene.toml")).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let both = plane(&of("gold"), light)
+        .replace("surface = \"one\"", "[sample.index_map]\nfile = \"metals.png\"\nsurfaces = [\"one\", \"two\"]")
+        .replace("[[view]]", &format!("[surface.two]\n{}\n[[view]]", of("iron")));
+    let found = simulate(&small(both), 0, 2e-3, false).unwrap();
+    for (surface, material) in [(0.0, "gold"), (1.0, "iron")] {
+        let expected = simulate(&small(plane(&of(material), light)), 0, 2e-3, false).unwrap();
+        for index in (0..16 * 12).filter(|i| (found.truth.surface[*i] - surface).abs() < 0.5) {
+            for (a, b) in found.image.colors.iter().zip(&expected.image.colors) {
+                assert!((a.s0[index] - b.s0[index]).abs() <= 4e-3 * b.s0[index], "{material}");
+                assert!((a.s1[index] - b.s1[index]).abs() <= 4e-3 * b.s0[index], "{material}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_simulated_is_refused_by_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let samples = Samples::F32(vec![1e-5, 1.0, 0.5, 0.5]);
     let picture = Picture { width: 2, height: 2, channels: 1, samples, encoding: Encoding::Linear };
-    picture.write_exr(&folder.path().join("eta.exr")).unwrap();
-    let map = "eta_map = { file = \"eta.exr\", coding = \"linear\" }\nalbedo = 0.0\nalpha = 0.1";
+    picture.write_exr(&folder.path().join("alpha.exr")).unwrap();
+    let map = "alpha_map = { file = \"alpha.exr\", coding = \"linear\" }\neta = 1.5\nalbedo = 0.0";
     let text = plane(map, "[light.uniform]\nradiance = 1.0");
     let mapped = Scene::parse(&text, &folder.path().join("scene.toml")).unwrap_or_else(|e| panic!("{e}"));
-    let error = simulate(&mapped, 0, 1e-3, false).unwrap_err();
-    assert!(matches!(&error, SimError::NotSimulated { key, .. } if key == "surface.one.eta_map"), "{error}");
+    // Levels of ln α would have to be 1.1e-4 apart.
+    let error = simulate(&mapped, 0, 1e-7, false).unwrap_err();
+    let line = 1 + text[..text.find("alpha_map").unwrap()].matches('\n').count();
+    let SimError::NotSimulated { place, .. } = &error else { panic!("{error}") };
+    assert_eq!((place.key.as_str(), place.line), ("surface.one.alpha_map", line), "{error}");
 
     assert!(matches!(simulate(&mapped, 1, 1e-3, false), Err(SimError::NoView { view: 1, views: 1 })));
     assert!(matches!(simulate(&mapped, 0, 0.0, false), Err(SimError::Tolerance(_))));

@@ -74,8 +74,8 @@ impl Pinhole {
     #[must_use]
     pub fn ray(&self, pixel: DVec2) -> DVec3 {
         let Pose { right, up, back, .. } = self.pose;
-        let from_axis = pixel - self.center();
-        (right * from_axis.x - up * from_axis.y - back * self.focal_px).normalize()
+        let beside = self.beside_axis(pixel);
+        (right * beside.x - up * beside.y - back * self.focal_px).normalize()
     }
 
     /// Where the ray through `pixel` meets the plane z = 0, (x, y) in m; `None` for rays that miss it.
@@ -98,11 +98,23 @@ impl Pinhole {
     /// The homography H with pixel ~ H (x, y, 1) for points (x, y) in m of the plane z = 0: K [r₁ r₂ t].
     #[must_use]
     pub fn plane_to_pixel(&self) -> DMat3 {
-        let (f, center) = (self.focal_px, self.center());
+        let (rotation, translation) = self.world_to_camera();
+        self.intrinsics() * DMat3::from_cols(rotation.x_axis, rotation.y_axis, translation)
+    }
+
+    /// K, px: pixel ~ K X for X in the camera's own axes as computer vision has them, x right, y **down**, z along the line of
+    /// sight.
+    #[must_use]
+    pub fn intrinsics(&self) -> DMat3 {
+        DMat3::from_cols(DVec3::X * self.focal_px, DVec3::Y * self.focal_px, self.center().extend(1.0))
+    }
+
+    /// (R, t) with X = R x + t from the world (m) into the axes of [`Self::intrinsics`].
+    #[must_use]
+    pub fn world_to_camera(&self) -> (DMat3, DVec3) {
         let Pose { position, right, up, back } = self.pose;
-        let to_camera = |v: DVec3| DVec3::new(v.dot(right), -v.dot(up), -v.dot(back));
-        let intrinsics = DMat3::from_cols(DVec3::X * f, DVec3::Y * f, center.extend(1.0));
-        intrinsics * DMat3::from_cols(to_camera(DVec3::X), to_camera(DVec3::Y), to_camera(-position))
+        let rotation = DMat3::from_cols(right, -up, -back).transpose();
+        (rotation, rotation * -position)
     }
 
     /// The ray from `point` in the plane (m) to the camera, with its camera frame: x̂ = normalize(right − (right·k) k), ŷ = k × x̂.
@@ -116,7 +128,7 @@ impl Pinhole {
     /// Cosine of the angle between the ray through `pixel` and the optical axis.
     #[must_use]
     pub fn off_axis_cosine(&self, pixel: DVec2) -> f64 {
-        self.focal_px / self.focal_px.hypot((pixel - self.center()).length())
+        self.focal_px / self.focal_px.hypot(self.beside_axis(pixel).length())
     }
 
     /// Middle of the pixel at `row` and `column`.
@@ -124,6 +136,11 @@ impl Pinhole {
     #[expect(clippy::cast_precision_loss, reason = "rows and columns of a picture are far below 2^52")]
     pub fn pixel(row: usize, column: usize) -> DVec2 {
         DVec2::new(column as f64 + 0.5, row as f64 + 0.5)
+    }
+
+    /// How far `pixel` is from where the optical axis meets the picture, px, x right and y **down**.
+    pub(crate) fn beside_axis(&self, pixel: DVec2) -> DVec2 {
+        pixel - self.center()
     }
 
     /// Where the optical axis meets the picture.

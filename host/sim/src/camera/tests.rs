@@ -60,6 +60,10 @@ proptest! {
         prop_assert!((back - pixel).length() < 1e-8, "{} {}", back, pixel);
         let h = camera.plane_to_pixel() * point.extend(1.0);
         prop_assert!((h.truncate() / h.z - pixel).length() < 1e-8);
+        let (rotation, translation) = camera.world_to_camera();
+        let seen = camera.intrinsics() * (rotation * point.extend(0.0) + translation);
+        prop_assert!(seen.z > 0.0 && (seen.truncate() / seen.z - pixel).length() < 1e-8);
+        prop_assert!((rotation.determinant() - 1.0).abs() < 1e-12);
     }
 
     /// Every ray's frame is right-handed about its propagation, x̂ stays in the plane of `right` and the ray, and on the axis it

@@ -30,8 +30,14 @@ pub(crate) fn shift(scene: &Scene, view: usize, angle: Radians) -> DVec2 {
     DVec2::new(c, -s) * length_px(scene, view)
 }
 
-/// One row of photosites of the moved picture behind the analyzer `row_weights`: electrons.
-pub(crate) fn fill_row(signal: &Signal, shift: DVec2, row_weights: [f32; 3], row: usize, out: &mut [f32]) {
+/// One row of photosites of the moved picture, each column behind the analyzer row `weights` gives: electrons.
+pub(crate) fn fill_row(
+    signal: &Signal,
+    shift: DVec2,
+    weights: impl Fn(usize) -> [f32; 3],
+    row: usize,
+    out: &mut [f32],
+) {
     // The light that arrives at a photosite left its own place `shift` before it.
     let (dx, fx) = whole(-shift.x);
     let (dy, fy) = whole(-shift.y);
@@ -40,7 +46,7 @@ pub(crate) fn fill_row(signal: &Signal, shift: DVec2, row_weights: [f32; 3], row
         let (left, right) = (clamped(column, dx, signal.width), clamped(column, dx + 1, signal.width));
         let band = &signal.bands[signal.band(row, column)];
         let mut sum = 0.0;
-        for (plane, weight) in band.iter().zip(row_weights) {
+        for (plane, weight) in band.iter().zip(weights(column)) {
             let at = |r: usize, c: usize| plane[r * signal.width + c];
             let upper = at(above, left) + fx * (at(above, right) - at(above, left));
             let lower = at(below, left) + fx * (at(below, right) - at(below, left));
@@ -108,7 +114,7 @@ mod tests {
         let scene = studio(3);
         let signal = Signal::new(&scene.camera, &picture(&scene), EffectSet::NONE);
         let mut moved = vec![0.0; signal.width];
-        fill_row(&signal, DVec2::new(2.0, 1.0), [1.0, 0.0, 0.0], 4, &mut moved);
+        fill_row(&signal, DVec2::new(2.0, 1.0), |_| [1.0, 0.0, 0.0], 4, &mut moved);
         let source = &signal.bands[0][0][3 * signal.width..][..signal.width];
         assert_eq!(&moved[2..], &source[..signal.width - 2]);
         assert_eq!(moved[..2], [source[0], source[0]]);

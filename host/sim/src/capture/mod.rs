@@ -6,5 +6,6 @@ pub(crate) mod beam_shift;
 pub(crate) mod extinction;
 pub(crate) mod light_drift;
 pub(crate) mod psf;
+pub(crate) mod sheet_axis;
 pub(crate) mod vignetting;
 pub(crate) mod wheel_error;

@@ -9,11 +9,15 @@ mod schedule;
 #[cfg(test)]
 pub(crate) mod testing;
 
+use std::borrow::Cow;
+
 use glam::DVec2;
 use host_image::StokesImage;
 use protocol_polar::{Analyzer, Radians};
 use rayon::prelude::*;
 
+use crate::camera::Pinhole;
+use crate::capture::sheet_axis::SheetRow;
 use crate::capture::vignetting::Vignetting;
 use crate::capture::{backlash, beam_shift, extinction, light_drift, psf, wheel_error};
 use crate::rng::{Draw, Generator, Stream};
@@ -45,8 +49,9 @@ pub struct FrameSpec {
 
 /// Simulates the frames of one view.
 pub struct Exposer<'a> {
-    scene: &'a Scene,
+    scene: Cow<'a, Scene>,
     view: usize,
+    camera: Pinhole,
     effects: EffectSet,
     frames: Vec<FrameSpec>,
     source: Source,
@@ -67,6 +72,14 @@ pub(crate) struct Row<'a> {
     pub(crate) row: usize,
     seed: u64,
     view: usize,
+    index: usize,
+}
+
+/// A frame as it really is taken.
+struct Taken<'a> {
+    frame: &'a FrameSpec,
+    analyzer: Analyzer,
+    /// Number of its random draws.
     index: usize,
 }
 
@@ -111,6 +124,7 @@ impl<'a> Exposer<'a> {
     /// plan that chooses the exposure.
     pub fn new(scene: &'a Scene, view: usize, image: &StokesImage, effects: EffectSet) -> Result<Self, SimError> {
         checked(scene, view, image)?;
+        let camera = *scene.views.get(view).ok_or(SimError::NoView { view, views: scene.views.len() })?;
         let frames = schedule(scene, image)?;
         let mut signal = Signal::new(&scene.camera, image, effects);
         let sigma = scene.camera.psf_sigma_px;
@@ -120,7 +134,16 @@ impl<'a> Exposer<'a> {
         let (width, height) = (signal.width, signal.height);
         let shifts = effects.contains(Effect::BeamShift) && scene.polarizer.beam_deviation_arcmin > 0.0;
         let source = if shifts { Source::Shifted(signal) } else { Source::Fixed(signal.photosites()) };
-        Ok(Self { scene, view, effects, frames, source, stages: stages(scene, view, effects), width, height })
+        let stages = stages(scene, &camera, effects);
+        Ok(Self { scene: Cow::Borrowed(scene), view, camera, effects, frames, source, stages, width, height })
+    }
+
+    /// The same with a scene of its own, for whoever outlives the one it was made from.
+    #[must_use]
+    pub fn into_owned(self) -> Exposer<'static> {
+        let Self { scene, view, camera, effects, frames, source, stages, width, height } = self;
+        let scene = Cow::Owned(scene.into_owned());
+        Exposer { scene, view, camera, effects, frames, source, stages, width, height }
     }
 
     /// The frames of the plan, in order.
@@ -133,7 +156,11 @@ impl<'a> Exposer<'a> {
     /// last frame.
     #[must_use]
     pub fn analyzer(&self, frame: usize) -> Analyzer {
-        let (scene, spec) = (self.scene, &self.frames[frame]);
+        self.analyzer_of(&self.frames[frame])
+    }
+
+    fn analyzer_of(&self, spec: &FrameSpec) -> Analyzer {
+        let scene = &*self.scene;
         let has = |effect| self.effects.contains(effect);
         let mut analyzer =
             Analyzer { angle: spec.commanded, throughput: scene.polarizer.throughput(), efficiency: 1.0 };
@@ -156,11 +183,21 @@ impl<'a> Exposer<'a> {
     /// converter, so they are rounded and cut whatever the effects. Panics beyond the last frame.
     #[must_use]
     pub fn raw(&self, frame: usize) -> Vec<u16> {
+        self.raw_of(&self.frames[frame], frame)
+    }
+
+    /// As [`Self::raw`], of a frame that is not in the plan, such as one that a wheel and a clock of somebody else's decide: its
+    /// random draws are those of frame number `index`. Where [`Effect::WheelError`] and [`Effect::Backlash`] are left out, its
+    /// `commanded` is where the polarizer really is.
+    #[must_use]
+    pub fn raw_of(&self, frame: &FrameSpec, index: usize) -> Vec<u16> {
+        let analyzer = self.analyzer_of(frame);
+        let taken = Taken { frame, analyzer, index };
         let white = single(self.scene.camera.white_level_dn());
         let mut out = vec![0; self.width * self.height];
         let row = |buffer: &mut Vec<f32>, (row, out): (usize, &mut [u16])| {
             buffer.resize(self.width, 0.0);
-            self.fill_dn(frame, row, buffer);
+            self.fill_dn(&taken, row, buffer);
             out.iter_mut().zip(buffer.iter()).for_each(|(to, dn)| *to = sample(dn.clamp(0.0, white)));
         };
         out.par_chunks_exact_mut(self.width).enumerate().for_each_init(Vec::new, row);
@@ -171,14 +208,16 @@ impl<'a> Exposer<'a> {
     /// [`Effect::Quantization`], cut only with [`Effect::Saturation`]. Panics beyond the last frame.
     #[must_use]
     pub fn dn(&self, frame: usize) -> Vec<f32> {
-        self.float(|row, out| self.fill_dn(frame, row, out))
+        let taken = self.taken(frame);
+        self.float(|row, out| self.fill_dn(&taken, row, out))
     }
 
     /// Charges of frame number `frame` as the amplifier sees them, photoelectrons, row-major, height × width. Panics beyond the
     /// last frame.
     #[must_use]
     pub fn electrons(&self, frame: usize) -> Vec<f32> {
-        self.float(|row, out| self.fill_electrons(frame, row, out))
+        let taken = self.taken(frame);
+        self.float(|row, out| self.fill_electrons(&taken, row, out))
     }
 
     fn float(&self, fill: impl Fn(usize, &mut [f32]) + Sync) -> Vec<f32> {
@@ -187,29 +226,42 @@ impl<'a> Exposer<'a> {
         out
     }
 
-    fn fill_electrons(&self, frame: usize, row: usize, out: &mut [f32]) {
-        let spec = &self.frames[frame];
-        let analyzer = self.analyzer(frame);
-        let weights = analyzer.row().map(|w| single(w * spec.exposure_ms()));
+    fn taken(&self, index: usize) -> Taken<'_> {
+        Taken { frame: &self.frames[index], analyzer: self.analyzer(index), index }
+    }
+
+    fn fill_electrons(&self, taken: &Taken<'_>, row: usize, out: &mut [f32]) {
+        let Taken { frame, analyzer, index } = taken;
+        if self.effects.contains(Effect::SheetAxis) {
+            let sheet = SheetRow::new(&self.camera, row, analyzer, frame.exposure_ms());
+            self.fill_light(analyzer.angle, |column| sheet.weights(column), row, out);
+        } else {
+            let weights = analyzer.row().map(|w| single(w * frame.exposure_ms()));
+            self.fill_light(analyzer.angle, |_| weights, row, out);
+        }
+        let at = Row { frame, row, seed: self.scene.seed, view: self.view, index: *index };
+        self.stages.iter().for_each(|stage| stage.apply(&at, out));
+    }
+
+    /// Photoelectrons of a row, each column behind the analyzer row that `weights` gives; the polarizer stands at `angle`.
+    fn fill_light(&self, angle: Radians, weights: impl Fn(usize) -> [f32; 3], row: usize, out: &mut [f32]) {
         match &self.source {
             Source::Fixed(photosites) => {
                 let [s0, s1, s2] = photosites.each_ref().map(|plane| &plane[row * self.width..][..self.width]);
-                let [w0, w1, w2] = weights;
-                for (e, ((s0, s1), s2)) in out.iter_mut().zip(s0.iter().zip(s1).zip(s2)) {
+                for (column, (e, ((s0, s1), s2))) in out.iter_mut().zip(s0.iter().zip(s1).zip(s2)).enumerate() {
+                    let [w0, w1, w2] = weights(column);
                     *e = w0 * s0 + w1 * s1 + w2 * s2;
                 }
             }
             Source::Shifted(signal) => {
-                let shift: DVec2 = beam_shift::shift(self.scene, self.view, analyzer.angle);
+                let shift: DVec2 = beam_shift::shift(&self.scene, self.view, angle);
                 beam_shift::fill_row(signal, shift, weights, row, out);
             }
         }
-        let at = Row { frame: spec, row, seed: self.scene.seed, view: self.view, index: frame };
-        self.stages.iter().for_each(|stage| stage.apply(&at, out));
     }
 
-    fn fill_dn(&self, frame: usize, row: usize, out: &mut [f32]) {
-        self.fill_electrons(frame, row, out);
+    fn fill_dn(&self, taken: &Taken<'_>, row: usize, out: &mut [f32]) {
+        self.fill_electrons(taken, row, out);
         let camera = &self.scene.camera;
         let (scale, black) = (single(1.0 / camera.gain_e_per_dn), f32::from(camera.black_level_dn));
         out.iter_mut().for_each(|v| *v = *v * scale + black);
@@ -223,12 +275,10 @@ impl<'a> Exposer<'a> {
 }
 
 /// What happens to charges, in the order in which it does.
-fn stages(scene: &Scene, view: usize, effects: EffectSet) -> Vec<Box<dyn RowStage>> {
+fn stages(scene: &Scene, camera: &Pinhole, effects: EffectSet) -> Vec<Box<dyn RowStage>> {
     let mut stages: Vec<Box<dyn RowStage>> = Vec::new();
     let has = |effect| effects.contains(effect);
-    if let Some(stage) =
-        scene.views.get(view).filter(|_| has(Effect::Vignetting)).and_then(|v| Vignetting::of(scene, v))
-    {
+    if let Some(stage) = Some(scene).filter(|_| has(Effect::Vignetting)).and_then(|s| Vignetting::of(s, camera)) {
         stages.push(Box::new(stage));
     }
     if let Some(stage) = Some(scene).filter(|_| has(Effect::Prnu)).and_then(Prnu::of) {

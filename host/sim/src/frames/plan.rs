@@ -19,7 +19,7 @@ pub struct FramePlan {
     pub effects: EffectSet,
     /// At most this is lost by what was left out.
     pub bound: f64,
-    /// One per effect, in [`Effect::ALL`]'s order.
+    /// One per effect, in [`Effect::CAPTURE`]'s order.
     pub rows: Vec<FrameRow>,
 }
 
@@ -41,9 +41,10 @@ impl FramePlan {
     /// before have changed; as in [`crate::planner`] the budget holds Π (1 + b) − 1.
     #[must_use]
     pub fn new(facts: &Facts<'_>, tolerance: f64) -> Self {
-        let assessed = Effect::ALL.map(|effect| (effect, effect.assess(facts)));
+        let own = |effect| facts.assess(effect).map(|assessment| (effect, assessment));
+        let assessed: Vec<(Effect, Assessment)> = Effect::CAPTURE.into_iter().filter_map(own).collect();
         let absent = assessed.iter().filter(|(_, a)| !a.applies).map(|(e, _)| *e);
-        let base = absent.fold(EffectSet::all(), EffectSet::without);
+        let base = absent.fold(EffectSet::ALL, EffectSet::without);
         let fits: Vec<&(Effect, Assessment)> =
             assessed.iter().filter(|(_, a)| a.applies && a.bound <= tolerance).collect();
         let (mut effects, mut saved, mut bound) = (base, 0.0, 0.0);
@@ -66,7 +67,7 @@ impl FramePlan {
             };
             FrameRow { effect, assessment, on, why }
         };
-        Self { tolerance, effects, bound, rows: assessed.map(row).into() }
+        Self { tolerance, effects, bound, rows: assessed.into_iter().map(row).collect() }
     }
 }
 
@@ -86,7 +87,7 @@ pub fn true_difference(
         estimate(&Exposer::new(scene, view, image, effects)?, scene)?,
         estimate(&Exposer::new(scene, view, image, reference)?, scene)?,
     );
-    let signal = Signal::new(&scene.camera, image, EffectSet::all());
+    let signal = Signal::new(&scene.camera, image, EffectSet::ALL);
     let least: Vec<f32> = signal.bands.iter().map(|band| counted(&band[0])).collect();
     let mut worst = 0.0_f64;
     for (index, s0) in signal.photosites()[0].iter().enumerate() {

@@ -58,7 +58,7 @@ pub(crate) fn moments(values: &[f32]) -> (f64, f64) {
 /// the bound. Answers with both.
 pub(crate) fn check_bound(scene: &Scene, effect: Effect) -> Result<(f64, Assessment), TestCaseError> {
     let image = picture(scene);
-    let assessed = effect.assess(&Facts::new(scene, 0, &image).unwrap());
+    let assessed = Facts::new(scene, 0, &image).unwrap().assess(effect).unwrap();
     // Photosites are compared under their own filters, but for the filters themselves.
     let base = if effect == Effect::Bayer { EffectSet::NONE } else { EffectSet::NONE.with(Effect::Bayer) };
     let worst = true_difference(scene, 0, &image, base.with(effect), base).unwrap();

@@ -30,7 +30,7 @@ fn results_are_the_same_for_any_number_of_threads() {
     let frames = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let exposer = Exposer::new(&scene, 0, &image, EffectSet::all()).unwrap();
+            let exposer = Exposer::new(&scene, 0, &image, EffectSet::ALL).unwrap();
             (0..exposer.frames().len()).map(|k| exposer.raw(k)).collect::<Vec<_>>()
         })
     };

@@ -25,6 +25,15 @@ impl Chart {
         [w.dot(t) * scale, w.dot(b) * scale]
     }
 
+    /// Box around the coordinates of directions of which `along` tells the range of ω·axis.
+    pub(crate) fn project_box(&self, along: impl Fn(Vec3) -> [f32; 2]) -> Extent {
+        let [x, y, z] = self.axes.map(along);
+        let [near, far] = [z[1], z[0]].map(|z| 2.0 / (1.0 + z).max(1e-4));
+        let low = [x[0], y[0]].map(|a| if a < 0.0 { a * far } else { a * near });
+        let high = [x[1], y[1]].map(|a| if a > 0.0 { a * far } else { a * near });
+        Extent { low, high }
+    }
+
     pub(crate) fn direction(&self, [x, y]: [f64; 2]) -> DVec3 {
         let [t, b, c] = self.exact;
         let (x, y) = (0.5 * x, 0.5 * y);

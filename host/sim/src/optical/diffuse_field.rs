@@ -1,15 +1,16 @@
 //! The diffuse part of a view: irradiance tabulated over normals, and what leaves towards the camera tabulated over n·ω_o.
 
 use super::chart::{Extent, Field};
-use super::effects::{diffuse, diffuse_polarization, normal_variation};
+use super::effects::{diffuse_polarization, normal_variation};
 use super::light::SunPoints;
 use super::numbers::single;
-use super::prefilter::Pyramid;
 use super::survey::Pixels;
-use super::{Body, EffectSet, OpticalEffect, Surface};
+use super::{Body, Surface};
+use crate::{Effect, EffectSet};
 use core::f32::consts::FRAC_1_PI;
 use glam::{DVec3, Vec3};
 use host_optics::Ior;
+use host_optics::prefilter::{Pyramid, irradiance};
 
 /// Step of the grid over normals, radians: irradiance changes no faster than a cosine but at its own terminator.
 const NORMAL_STEP: f64 = 0.12;
@@ -42,8 +43,7 @@ impl Diffuse {
         sun: &SunPoints,
         effects: EffectSet,
     ) -> Self {
-        let Some(sky) = sky.filter(|_| effects.contains(OpticalEffect::Diffuse) && pixels.extent.albedo[1] > 0.0)
-        else {
+        let Some(sky) = sky.filter(|_| effects.contains(Effect::Diffuse) && pixels.extent.albedo[1] > 0.0) else {
             return Self::None;
         };
         let dielectrics = surface.ior.map(|ior| if let Ior::Dielectric(d) = ior { Some(d) } else { None });
@@ -53,10 +53,10 @@ impl Diffuse {
             (Body::Lambert, _) => None,
         };
         let value = |normal: DVec3| {
-            let [r, g, b] = diffuse::irradiance(sky, sun, body, normal).map(single);
+            let [r, g, b] = irradiance(sky, &sun.sources, body, normal).map(single);
             [r, g, b, 0.0]
         };
-        let flat = !effects.contains(OpticalEffect::NormalVariation) || pixels.extent.normal_radius < 1e-6;
+        let flat = !effects.contains(Effect::NormalVariation) || pixels.extent.normal_radius < 1e-6;
         let irradiance = if flat {
             Irradiance::Constant(value(normal_variation::mean(pixels.extent)))
         } else {

@@ -3,8 +3,9 @@
 //! Radiance and polarization pattern are kept apart, so that an effect can be left out: light without its polarization,
 //! a sky without its neutral points, a sun without its disk. (L, Q, U) are in [`host_optics::Frame::sky`].
 
-use super::{EffectSet, OpticalEffect};
+use crate::{Effect, EffectSet};
 use glam::DVec3;
+use host_optics::prefilter::{Pyramid, Sources};
 use host_optics::sky::{Berry, ClearSky, MoonSpencer, Pattern, Rayleigh, StokesMap, SunDisk, Uniform};
 use host_optics::{Light, OpticsError};
 
@@ -88,12 +89,15 @@ enum BandPattern {
     Berry(Berry),
 }
 
-/// Directions over the sun's disk with their solid angles in steradians, and the disk's radiance.
+/// The sun as points over its disk, and as a disk.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SunPoints {
-    pub(crate) points: Vec<(DVec3, f64)>,
+    pub(crate) sources: Sources,
     pub(crate) disk: Option<SunDisk>,
-    pub(crate) radiance: [f64; 3],
+    /// Unit direction of the disk's center.
+    pub(crate) center: DVec3,
+    /// Radians.
+    pub(crate) angular_radius: f64,
 }
 
 impl SceneLight {
@@ -107,7 +111,7 @@ impl SceneLight {
     pub(crate) fn bands(&self, effects: EffectSet) -> Result<[BandLight<'_>; 3], OpticsError> {
         let pattern = super::effects::neutral_points::pattern(self.pattern, effects);
         let pattern = match pattern {
-            _ if !effects.contains(OpticalEffect::IncidentPolarization) => BandPattern::None,
+            _ if !effects.contains(Effect::IncidentPolarization) => BandPattern::None,
             None => BandPattern::Own,
             Some(SkyPattern::Rayleigh { sun, max_dolp }) => BandPattern::Rayleigh(Rayleigh::new(sun, max_dolp)?),
             Some(SkyPattern::Berry { sun, splitting_deg, max_dolp }) => {
@@ -144,6 +148,20 @@ impl SceneLight {
 }
 
 impl Radiance {
+    /// Whether it is a multiple of another: then whatever is relative to s0 is the same for both.
+    pub(crate) fn proportional(&self, other: &Self) -> bool {
+        let multiple =
+            |a: [f64; 3], b: [f64; 3]| (0..3).all(|k| (a[k] * b[0] - a[0] * b[k]).abs() <= 1e-12 * a[0] * b[0]);
+        match (self, other) {
+            (Self::Uniform(_), Self::Uniform(_)) | (Self::Overcast(_), Self::Overcast(_)) => true,
+            (Self::Clear(a), Self::Clear(b)) => {
+                let shape = |c: &ClearSky| (c.width, c.sun);
+                shape(a) == shape(b) && multiple([a.base, a.horizon, a.aureole], [b.base, b.horizon, b.aureole])
+            }
+            _ => false,
+        }
+    }
+
     /// Range over the upper hemisphere and largest DoLP of its own.
     fn bounds(&self) -> ([f64; 2], f64) {
         match self {
@@ -225,7 +243,7 @@ impl SunPoints {
     /// What a mirror sees of the sun, whose disk no mirror can do without.
     pub(crate) fn radiance_towards(&self, direction: DVec3) -> [f64; 3] {
         match self.disk {
-            Some(disk) if disk.stokes(direction)[0] > 0.0 => self.radiance,
+            Some(disk) if disk.stokes(direction)[0] > 0.0 => self.sources.radiance,
             _ => [0.0; 3],
         }
     }
@@ -235,4 +253,18 @@ impl Sun {
     pub(crate) fn disk(&self) -> Result<SunDisk, OpticsError> {
         SunDisk::new(self.direction, self.angular_radius_rad, 1.0)
     }
+}
+
+/// The prefiltered sky of three bands: a map by its own texels, a formula sampled.
+pub(crate) fn pyramid(bands: &[BandLight<'_>; 3]) -> Result<Pyramid, OpticsError> {
+    let maps = || bands.iter().filter_map(BandLight::map).map(StokesMap::size);
+    let larger = |[width, height]: [usize; 2], (w, h): (usize, usize)| [width.max(w), height.max(h)];
+    let formula = bands.iter().any(|b| b.map().is_none());
+    let [width, height] = maps().fold(if formula { Pyramid::FORMULA_SIZE } else { [0, 0] }, larger);
+    Pyramid::new([width, height], |row, column, direction| {
+        bands.each_ref().map(|b| {
+            let texel = b.texel(row, column, width, height);
+            texel.map_or_else(|| b.stokes(direction), |own| b.with_radiance(own, direction))
+        })
+    })
 }

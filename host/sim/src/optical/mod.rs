@@ -3,7 +3,7 @@
 //!
 //! - A picture comes in as one [`Pixel`] per camera ray and leaves as s0, s1, s2 of three bands, in the camera frame of each
 //!   ray ([`host_optics::Frame::camera`]); rows run down, row-major.
-//! - [`EffectSet`] says which effects must be in the picture. Leaving one out is a permission: a method for which an effect
+//! - [`crate::EffectSet`] says which effects must be in the picture. Leaving one out is a permission: a method for which an effect
 //!   costs nothing keeps it.
 //! - [`Evaluation`] says how paper eq. 6 is integrated. The pixel loop is compiled once per kind of reflection, so that an
 //!   effect left out is neither computed nor asked for.
@@ -14,23 +14,21 @@ mod chart;
 mod diffuse_field;
 pub mod effects;
 mod facts;
-mod kernel;
 mod light;
 pub(crate) mod numbers;
-mod prefilter;
 mod render;
-mod set;
 mod specular;
+mod sun_lobe;
 mod survey;
 mod table;
 
 pub use facts::OpticalFacts;
 pub use light::{LightBounds, Radiance, SceneLight, SkyPattern, Sun};
 pub use render::{Renderer, Rendering, SurfaceReport, Timing};
-pub use set::{EffectSet, OpticalEffect};
 pub use specular::{Evaluation, Method};
 pub use survey::{PixelMap, SurfaceExtent, Survey};
 
+use host_optics::ggx::MIN_ALPHA;
 use host_optics::{Ggx, Ior};
 
 /// What one camera ray meets.
@@ -69,4 +67,12 @@ pub struct Surface {
     pub ggx: Ggx,
     /// Diffuse part.
     pub body: Body,
+}
+
+impl Surface {
+    /// Whether it has no roughness to speak of: every method takes it for a mirror.
+    #[must_use]
+    pub fn is_mirror(&self) -> bool {
+        self.ggx.alpha() <= MIN_ALPHA
+    }
 }

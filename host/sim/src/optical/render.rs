@@ -2,17 +2,17 @@
 
 use super::diffuse_field::Diffuse;
 use super::effects::{normal_variation, sun_disk};
-use super::kernel::Facets;
-use super::light::{BandLight, SceneLight, SunPoints};
+use super::light::{BandLight, SceneLight, SunPoints, pyramid};
 use super::numbers::single3;
-use super::prefilter::Pyramid;
 use super::specular::{Evaluation, Method, Point, Rule, Specular};
 use super::survey::{PixelMap, Survey};
 use super::table::lanes;
-use super::{EffectSet, OpticalEffect, Pixel, Radiance, Surface};
+use super::{Pixel, Radiance, Surface};
+use crate::{Effect, EffectSet};
 use core::f64::consts::TAU;
 use glam::{DVec3, Vec3};
 use host_optics::OpticsError;
+use host_optics::prefilter::{Pyramid, Reflector};
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
 
@@ -72,6 +72,13 @@ impl Timing {
     }
 }
 
+/// A surface as the effects leave it.
+fn reflector(surface: &Surface, effects: EffectSet) -> Reflector {
+    let whole = Reflector::new(surface.ior, surface.ggx);
+    let masked = if effects.contains(Effect::Masking) { whole } else { whole.without_masking() };
+    if effects.contains(Effect::Retardance) { masked } else { masked.without_retardance() }
+}
+
 struct Plan<'a> {
     specular: Specular,
     diffuse: Diffuse,
@@ -95,8 +102,8 @@ impl<'a> Renderer<'a> {
         let sun = sun_disk::points(light.sun.as_ref(), effects)?;
         let smooth = light.smooth();
         let prefiltered = matches!(evaluation, Evaluation::Prefiltered { .. }) && !smooth;
-        let rough = effects.contains(OpticalEffect::Roughness);
-        let sky = (effects.contains(OpticalEffect::Diffuse) || (prefiltered && rough)).then(|| Pyramid::new(&bands));
+        let rough = effects.contains(Effect::Roughness);
+        let sky = (effects.contains(Effect::Diffuse) || (prefiltered && rough)).then(|| pyramid(&bands)).transpose()?;
         let [r, g, b] = &light.radiance;
         let sizes =
             light.radiance.iter().filter_map(|r| if let Radiance::Map(m) = r { Some(m.size().0) } else { None });
@@ -141,7 +148,7 @@ impl<'a> Renderer<'a> {
         let tables = start.elapsed();
         let start = Instant::now();
         let (plans, surfaces): (Vec<_>, Vec<_>) = planned.into_iter().unzip();
-        let stokes = if self.effects.contains(OpticalEffect::DiffusePolarization) {
+        let stokes = if self.effects.contains(Effect::DiffusePolarization) {
             pixels::<true>(map, &plans, memory)
         } else {
             pixels::<false>(map, &plans, memory)
@@ -166,7 +173,7 @@ impl<'a> Renderer<'a> {
             sky: self.sky.as_ref(),
             sun: &self.sun,
             surface,
-            facets: Facets::new(surface, self.effects),
+            reflector: reflector(surface, self.effects),
             rule: Rule::choose(self.evaluation, self.effects, smooth, surface, self.texel),
             camera_x: map.camera_x,
         };
@@ -176,7 +183,7 @@ impl<'a> Renderer<'a> {
         };
         let (specular, method) = Specular::plan(&own, &point, self.evaluation, self.effects);
         let diffuse = Diffuse::plan(&own, surface, self.sky.as_ref(), &self.sun, self.effects);
-        let flat = !self.effects.contains(OpticalEffect::NormalVariation);
+        let flat = !self.effects.contains(Effect::NormalVariation);
         let normal = flat.then(|| normal_variation::mean(own.extent));
         (Plan { specular, diffuse, point, normal }, SurfaceReport { pixels: own.extent.pixels, method })
     }
@@ -211,7 +218,18 @@ fn pixels<const DIFFUSE_POLARIZED: bool>(
 }
 
 /// Pixels of a row that share three look-ups where one normal stands for all.
-const RUN: u16 = 32;
+const RUN: usize = 32;
+
+/// Where the pixels of a run lie between its ends, 0 to 1.
+const PLACES: [f32; RUN] = {
+    let mut places = [0.0; RUN];
+    let (mut k, mut x) = (0, 0.0);
+    while k < RUN {
+        places[k] = x / 31.0;
+        (k, x) = (k + 1, x + 1.0);
+    }
+    places
+};
 
 impl Plan<'_> {
     /// A run of pixels of one surface with one normal: its Stokes parameters by a parabola through both ends and the middle,
@@ -219,15 +237,13 @@ impl Plan<'_> {
     #[inline]
     fn run<const DIFFUSE_POLARIZED: bool>(&self, line: &[Pixel], out: &mut [[[f32; 3]; 3]], camera_x: Vec3) -> usize {
         let (Specular::Flat(field), Some(normal)) = (&self.specular, self.normal.map(single3)) else { return 0 };
-        let count = usize::from(RUN);
-        let Some(run) = line.get(..count) else { return 0 };
-        if run.iter().any(|p| p.surface != run[0].surface) {
+        let (Some(run), Some(out)) = (line.first_chunk::<RUN>(), out.first_chunk_mut::<RUN>()) else { return 0 };
+        if run.iter().fold(0, |any, p| any | (p.surface ^ run[0].surface)) != 0 {
             return 0;
         }
-        let [a, b, c] = [&run[0], &run[count / 2], &run[count - 1]].map(|p| Vec3::from(p.to_camera));
+        let [a, b, c] = [&run[0], &run[RUN / 2], &run[RUN - 1]].map(|p| Vec3::from(p.to_camera));
         let length = a.distance(c);
-        // The middle pixel lies at this share of the way.
-        let middle = f32::from(RUN / 2) / f32::from(RUN - 1);
+        let middle = PLACES[RUN / 2];
         let straight = (a + (c - a) * middle).distance(b) <= 0.02 * length + 1e-6;
         if length > 0.3 * field.step() || !straight || [a, b, c].iter().any(|wo| normal.dot(*wo) <= 0.0) {
             return 0;
@@ -241,15 +257,19 @@ impl Plan<'_> {
             second[k] = (rise - chord * middle) / (middle * (middle - 1.0));
             first[k] = chord - second[k];
         }
-        for (j, (s, p)) in (0..RUN).zip(out.iter_mut().zip(run)) {
-            let x = f32::from(j) / f32::from(RUN - 1);
+        for (x, s) in PLACES.iter().zip(out.iter_mut()) {
             let s = s.as_flattened_mut();
             for k in 0..9 {
                 s[k] = fa[k] + x * (first[k] + x * second[k]);
             }
-            self.diffuse.add::<DIFFUSE_POLARIZED>(s, normal, Vec3::from(p.to_camera), camera_x, p.albedo);
         }
-        count
+        if !matches!(self.diffuse, Diffuse::None) {
+            for (s, p) in out.iter_mut().zip(run) {
+                let (s, wo) = (s.as_flattened_mut(), Vec3::from(p.to_camera));
+                self.diffuse.add::<DIFFUSE_POLARIZED>(s, normal, wo, camera_x, p.albedo);
+            }
+        }
+        RUN
     }
 
     #[inline]

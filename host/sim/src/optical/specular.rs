@@ -1,17 +1,18 @@
 //! How the specular part of eq. 6 is evaluated, and the choice for each surface of a view.
 
+use super::Surface;
 use super::chart::Field;
 use super::effects::normal_variation;
-use super::kernel::{Facets, Fineness, Rgb};
 use super::light::{BandLight, SunPoints};
 use super::numbers::single3;
-use super::prefilter::Pyramid;
+use super::sun_lobe;
 use super::survey::Pixels;
 use super::table::{Lanes, Table, lanes};
-use super::{EffectSet, OpticalEffect, Surface};
+use crate::{Effect, EffectSet};
 use glam::{DVec3, Vec3};
-use host_optics::Microfacet;
 use host_optics::integral::{Adaptive, FixedPoints, View, discrete};
+use host_optics::prefilter::{Fineness, Pyramid, Reflector, Rgb, Sources};
+use host_optics::{Light, Microfacet};
 
 /// How paper eq. 6 is evaluated where the surface is rough. A surface without its roughness is a mirror under any of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,7 +70,7 @@ pub(crate) struct Point<'a> {
     pub(crate) sky: Option<&'a Pyramid>,
     pub(crate) sun: &'a SunPoints,
     pub(crate) surface: &'a Surface,
-    pub(crate) facets: Facets,
+    pub(crate) reflector: Reflector,
     pub(crate) rule: Rule,
     pub(crate) camera_x: DVec3,
 }
@@ -83,6 +84,9 @@ pub(crate) enum Specular {
     Table(Table),
     Direct,
 }
+
+/// Below this multiple of the sun's angular radius a lobe sees the points of the disk one by one.
+const NARROW: f64 = 2.0;
 
 /// Test pixels of a table.
 const TESTS: usize = 32;
@@ -109,7 +113,7 @@ impl Rule {
         surface: &Surface,
         texel: f64,
     ) -> Self {
-        if !effects.contains(OpticalEffect::Roughness) {
+        if !effects.contains(Effect::Roughness) || surface.is_mirror() {
             return Self::Mirror;
         }
         match evaluation {
@@ -129,20 +133,23 @@ impl Point<'_> {
     pub(crate) fn at(&self, normal: DVec3, wo: DVec3) -> Rgb {
         let Ok(view) = View::new(wo, self.camera_x) else { return [[0.0; 3]; 3] };
         let mut out = match &self.rule {
-            Rule::Mirror if self.polarized => return self.facets.mirror::<true>(self.light, self.sun, normal, &view),
-            Rule::Mirror => return self.facets.mirror::<false>(self.light, self.sun, normal, &view),
+            Rule::Mirror if self.polarized => {
+                return self.reflector.mirror::<true>(|wi| self.seen::<true>(wi), normal, &view);
+            }
+            Rule::Mirror => return self.reflector.mirror::<false>(|wi| self.seen::<false>(wi), normal, &view),
             Rule::Cells(fineness) => match self.sky {
-                Some(sky) if sky.polarized() => self.facets.prefiltered::<true>(sky, *fineness, normal, &view),
-                Some(sky) => self.facets.prefiltered::<false>(sky, *fineness, normal, &view),
+                Some(sky) => self.reflector.specular(sky, *fineness, normal, &view),
                 None => [[0.0; 3]; 3],
             },
             Rule::Points(rule) => self.bands(|band, surface| rule.specular(band, surface, normal, &view)),
             Rule::Adaptive(rule) => self.bands(|band, surface| rule.specular(band, surface, normal, &view).value),
         };
-        if !self.sun.points.is_empty() {
+        if !self.sun.sources.points.is_empty() {
+            let narrow = self.narrow_sun(normal, wo);
+            let sources = narrow.as_ref().unwrap_or(&self.sun.sources);
             let sun = match self.rule {
-                Rule::Adaptive(_) => self.exact_sun(normal, &view),
-                _ => self.facets.sun(self.sun, normal, &view),
+                Rule::Adaptive(_) => self.exact_sun(sources, normal, &view),
+                _ => self.reflector.sources(sources, normal, &view),
             };
             for (s, more) in out.iter_mut().flatten().zip(sun.iter().flatten()) {
                 *s += more;
@@ -151,17 +158,43 @@ impl Point<'_> {
         out
     }
 
+    /// What a mirror sees of the sky and of the sun's disk; L alone where the light is not polarized.
+    fn seen<const POLARIZED: bool>(&self, wi: DVec3) -> Rgb {
+        let disk = self.sun.radiance_towards(wi);
+        core::array::from_fn(|k| {
+            if POLARIZED {
+                let [l, q, u] = self.light[k].stokes(wi);
+                [l + disk[k], q, u]
+            } else {
+                [self.light[k].radiance(wi) + disk[k], 0.0, 0.0]
+            }
+        })
+    }
+
     /// Three bands, or one for all where nothing tells them apart.
     fn bands(&self, value: impl Fn(&BandLight<'_>, &Microfacet) -> [f64; 3]) -> Rgb {
         let one = |k: usize| value(&self.light[k], &Microfacet { ior: self.surface.ior[k], ggx: self.surface.ggx });
         if self.gray { [one(0); 3] } else { [one(0), one(1), one(2)] }
     }
 
-    fn exact_sun(&self, normal: DVec3, view: &View) -> Rgb {
+    /// The sun's disk in points that follow the lobe, where that is not much wider than the disk.
+    fn narrow_sun(&self, normal: DVec3, wo: DVec3) -> Option<Sources> {
+        let alpha = self.surface.ggx.alpha();
+        let radius = self.sun.angular_radius;
+        // One point for all of the disk is left out's own choice.
+        if self.sun.sources.points.len() == 1 || alpha > NARROW * radius || normal.dot(wo) <= 0.0 {
+            return None;
+        }
+        let mirror = normal * (2.0 * normal.dot(wo)) - wo;
+        let points = sun_lobe::points(self.sun.center, radius, mirror, sun_lobe::width(alpha, normal, wo));
+        Some(Sources { points, radiance: self.sun.sources.radiance })
+    }
+
+    fn exact_sun(&self, sun: &Sources, normal: DVec3, view: &View) -> Rgb {
         let one = |k: usize| {
-            let light = host_optics::sky::Uniform { radiance: self.sun.radiance[k] };
+            let light = host_optics::sky::Uniform { radiance: sun.radiance[k] };
             let surface = Microfacet { ior: self.surface.ior[k], ggx: self.surface.ggx };
-            discrete(&light, &self.sun.points, &surface, normal, view)
+            discrete(&light, &sun.points, &surface, normal, view)
         };
         [one(0), one(1), one(2)]
     }
@@ -179,14 +212,21 @@ impl Specular {
             Evaluation::Prefiltered { tolerance } => (point.light.iter().all(|b| b.map().is_none()), tolerance),
             _ => return (Self::Direct, Method::Direct),
         };
-        // A mirror under a map is as sharp as the map.
-        if matches!(point.rule, Rule::Mirror) && !smooth {
+        // A mirror under a map is as sharp as the map, and the sun has an edge.
+        let sun = !point.sun.sources.points.is_empty();
+        if matches!(point.rule, Rule::Mirror) && (!smooth || sun) {
             return (Self::Direct, Method::Direct);
         }
-        let flat = !effects.contains(OpticalEffect::NormalVariation);
+        let flat = !effects.contains(Effect::NormalVariation);
         let limit = pixels.extent.pixels / 2 + 64;
         // One normal leaves two coordinates of four.
-        let tests = pixels.some(if flat { TESTS / 2 } else { TESTS });
+        let count = if flat { TESTS / 2 } else { TESTS };
+        let mut tests = pixels.some(count);
+        if sun {
+            // A table is worst where the highlight is, which a few pixels miss.
+            let reach = 4.0 * point.surface.ggx.alpha() + point.sun.angular_radius;
+            tests.extend(pixels.mirroring(point.sun.center, reach, count));
+        }
         let mut step = if smooth { 0.15 } else { point.surface.ggx.alpha().clamp(0.01, 0.15) };
         for _ in 0..REFINEMENTS {
             let (plan, nodes) = if flat {

@@ -17,8 +17,12 @@ pub struct PixelMap<'a> {
     pub pixels: &'a [Pixel],
 }
 
-/// Of so many rows one is looked at for a surface's mean normal and view.
-const SKIP: usize = 8;
+/// Of up to so many rows one, and at least so many, are looked at for a surface's mean normal and view.
+const SKIP: usize = 32;
+
+/// Pixels of a row that differ in nothing but ω_o are taken together, up to so many: enough to save work, few enough for the
+/// box around their ω_o to be small.
+const RUN: usize = 32;
 
 /// What a view holds, surface by surface.
 #[derive(Clone, Debug)]
@@ -37,7 +41,8 @@ pub struct SurfaceExtent {
     pub hidden: usize,
     /// Unit mean of (a sample of) their normals.
     pub mean_normal: DVec3,
-    /// No normal is farther from the mean, as a chord (about radians).
+    /// No normal is farther from the mean, as a chord (about radians). Like every extent here an upper bound that is met, or all but
+    /// met: equal pixels are taken together.
     pub normal_radius: f64,
     /// Unit mean of ω_o.
     pub mean_view: DVec3,
@@ -96,7 +101,7 @@ impl Survey {
         let width = map.width.max(1);
         let lines: Vec<&[Pixel]> = map.pixels.chunks(width).collect();
         // A few rows tell the centers; all of them if some surface is not among those.
-        let mut total = totals(&lines, SKIP, surfaces);
+        let mut total = totals(&lines, SKIP.min(lines.len() / SKIP).max(1), surfaces);
         if total.iter().any(|s| s.pixels == 0) {
             total = totals(&lines, 1, surfaces);
         }
@@ -108,11 +113,14 @@ impl Survey {
             .par_iter()
             .enumerate()
             .fold(none, |mut boxes, (row, line)| {
-                for p in line.iter() {
-                    let k = usize::from(p.surface);
+                let mut rest = *line;
+                while let Some(first) = rest.first() {
+                    let (run, views) = Views::of_run(rest);
+                    let k = usize::from(first.surface);
                     if let (Some(b), Some(c)) = (boxes.get_mut(k), centers.get(k)) {
-                        b.add(p, row, c, &view_chart);
+                        b.add_run(run, &views, row, c, &view_chart);
                     }
+                    rest = &rest[run.len()..];
                 }
                 boxes
             })
@@ -166,11 +174,79 @@ impl<'a> Pixels<'a> {
 
     /// Up to about `count` of them, spread over the picture.
     pub(crate) fn some(self, count: usize) -> Vec<(Vec3, Vec3)> {
-        // A stride with the golden ratio in it does not fall in step with rows.
-        let stride = (self.extent.pixels / count.max(1)).max(1);
-        let own = self.map.pixels.iter().filter(|p| p.surface == self.surface);
-        let facing = own.map(|p| (Vec3::from(p.normal), Vec3::from(p.to_camera))).filter(|(n, o)| n.dot(*o) > 0.0);
-        facing.skip(stride / 2).step_by(stride).collect()
+        let width = self.map.width.max(1);
+        let [first, end] = self.extent.rows;
+        let own = self.map.pixels.get(first * width..(end * width).min(self.map.pixels.len())).unwrap_or_default();
+        let facing = |p: &Pixel| {
+            let (n, o) = (Vec3::from(p.normal), Vec3::from(p.to_camera));
+            (p.surface == self.surface && n.dot(o) > 0.0).then_some((n, o))
+        };
+        // So many pixels are looked at, an odd number apart, out of step with rows of even width; of a surface that is rarely
+        // hit, all.
+        let stride = (own.len() / (4 * count.max(1))) | 1;
+        let mut found: Vec<_> = own.iter().skip(stride / 2).step_by(stride).filter_map(facing).collect();
+        if found.len() < count {
+            found = own.iter().filter_map(facing).collect();
+        }
+        let thin = (found.len() / count.max(1)).max(1);
+        found.into_iter().skip(thin / 2).step_by(thin).collect()
+    }
+
+    /// Up to `count` pixels whose mirrored ray is within `reach` (a chord) of a direction; one at least.
+    pub(crate) fn mirroring(self, direction: DVec3, reach: f64, count: usize) -> Vec<(Vec3, Vec3)> {
+        let target = single3(direction);
+        let far = |(n, o): &(Vec3, Vec3)| (*n * (2.0 * n.dot(*o)) - *o).distance_squared(target);
+        let all: Vec<_> = self.rows().map(|at| (far(&at), at)).collect();
+        let reach = super::numbers::single(reach * reach);
+        let near: Vec<_> = all.iter().filter(|(d, _)| *d <= reach).map(|(_, at)| *at).collect();
+        let thin = (near.len() / count.max(1)).max(1);
+        let nearest = all.iter().min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, at)| *at);
+        nearest.into_iter().chain(near.into_iter().skip(thin / 2).step_by(thin)).collect()
+    }
+}
+
+/// Box around the ω_o of some pixels, by component.
+struct Views {
+    low: Vec3,
+    high: Vec3,
+}
+
+impl Views {
+    /// The first pixels of `line` that differ in nothing but ω_o, at most [`RUN`].
+    #[inline]
+    fn of_run(line: &[Pixel]) -> (&[Pixel], Self) {
+        let first = line[0];
+        let key = |p: &Pixel| {
+            let [nx, ny, nz] = p.normal.map(f32::to_bits);
+            let [r, g, b] = p.albedo.map(f32::to_bits);
+            ([nx, ny, nz, r], [g, b, u32::from(p.surface)])
+        };
+        let own = key(&first);
+        let [mut low, mut high] = [first.to_camera; 2];
+        let mut count = 0;
+        for p in line.iter().take(RUN) {
+            if key(p) != own {
+                break;
+            }
+            for (k, x) in p.to_camera.into_iter().enumerate() {
+                // Unlike f32::min and f32::max these are single instructions.
+                low[k] = if x < low[k] { x } else { low[k] };
+                high[k] = if x > high[k] { x } else { high[k] };
+            }
+            count += 1;
+        }
+        (&line[..count], Self { low: Vec3::from(low), high: Vec3::from(high) })
+    }
+
+    /// Range of ω_o·v.
+    fn along(&self, v: Vec3) -> [f32; 2] {
+        let (a, b) = (v * self.low, v * self.high);
+        [a.min(b).element_sum(), a.max(b).element_sum()]
+    }
+
+    /// The largest squared distance from `center`.
+    fn farthest(&self, center: Vec3) -> f32 {
+        (self.low - center).abs().max((self.high - center).abs()).length_squared()
     }
 }
 
@@ -250,6 +326,31 @@ impl Boxes {
         hidden: 0,
     };
 
+    /// Pixels that differ in nothing but ω_o, in `views`.
+    fn add_run(&mut self, run: &[Pixel], views: &Views, row: usize, c: &Centers, view_chart: &Chart) {
+        let normal = Vec3::from(run[0].normal);
+        let cosine = views.along(normal);
+        if run.len() < 4 || cosine[0] <= 0.0 {
+            run.iter().for_each(|p| self.add(p, row, c, view_chart));
+            return;
+        }
+        self.pixels += run.len();
+        self.rows = [self.rows[0].min(row), self.rows[1].max(row + 1)];
+        self.view.merge(&view_chart.project_box(|axis| views.along(axis)));
+        self.normal_radius = self.normal_radius.max(normal.distance_squared(c.normal_single));
+        self.view_radius = self.view_radius.max(views.farthest(c.view_single));
+        self.cosine = [self.cosine[0].min(cosine[0]), self.cosine[1].max(cosine[1].min(1.0))];
+        let [lowest, _] = views.along(normal * (2.0 * normal.z) - Vec3::Z);
+        self.lowest_mirror = self.lowest_mirror.min(lowest);
+        self.add_albedo(run[0].albedo);
+    }
+
+    fn add_albedo(&mut self, albedo: [f32; 3]) {
+        for a in albedo {
+            self.albedo = [self.albedo[0].min(a), self.albedo[1].max(a)];
+        }
+    }
+
     fn add(&mut self, p: &Pixel, row: usize, c: &Centers, view_chart: &Chart) {
         let (n, o) = (Vec3::from(p.normal), Vec3::from(p.to_camera));
         let cosine = n.dot(o);
@@ -264,9 +365,7 @@ impl Boxes {
         self.view_radius = self.view_radius.max(o.distance_squared(c.view_single));
         self.cosine = [self.cosine[0].min(cosine), self.cosine[1].max(cosine)];
         self.lowest_mirror = self.lowest_mirror.min(2.0 * cosine * n.z - o.z);
-        for a in p.albedo {
-            self.albedo = [self.albedo[0].min(a), self.albedo[1].max(a)];
-        }
+        self.add_albedo(p.albedo);
     }
 
     fn merge(&mut self, other: &Self) {

@@ -6,10 +6,10 @@
 //! frame of their own ω_o, which is smooth in both. Only nodes some pixel asks for are computed.
 
 use super::chart::{Axis, Chart, Extent};
-use super::kernel::Rgb;
 use super::numbers::{cell, count_above, real, single};
 use super::survey::Pixels;
 use glam::{DVec3, Vec3};
+use host_optics::prefilter::Rgb;
 use rayon::prelude::*;
 
 /// Nine numbers, padded to whole vectors: band-major (s0, s1, s2).

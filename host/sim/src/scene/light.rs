@@ -66,6 +66,19 @@ pub struct TurnedMap {
     map: StokesMap,
     /// (cos, sin) of the azimuth at which the map's own azimuth 0 lies.
     turn: (f64, f64),
+    /// Where it comes from.
+    source: MapSource,
+}
+
+/// The file of an environment map and how it is used.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapSource {
+    /// As found from the scene's folder.
+    pub file: PathBuf,
+    /// Azimuth shown in the middle of the picture.
+    pub center_azimuth: Radians,
+    /// Radiance of the scene per number of the file.
+    pub scale: f64,
 }
 
 /// `[light]` as written.
@@ -146,6 +159,12 @@ struct RawDisk {
 }
 
 impl TurnedMap {
+    /// Where it comes from.
+    #[must_use]
+    pub fn source(&self) -> &MapSource {
+        &self.source
+    }
+
     /// The map as it is in the file, in its own azimuth.
     pub(crate) fn map(&self) -> &StokesMap {
         &self.map
@@ -273,7 +292,8 @@ impl RawSun {
 
 impl RawDisk {
     fn check(&self, light: &At<'_>, sun: DVec3) -> Result<optical::Sun, SimError> {
-        let elevation = sun.z.asin().to_degrees();
+        // Free of the rounding of the way to a direction and back.
+        let elevation = (sun.z.asin().to_degrees() * 1e9).round() / 1e9;
         light.table("sun").check(elevation > 0.0, "elevation_deg", elevation, || {
             "above 0 while there is a `light.sun_disk`: below the horizon no disk is seen".to_owned()
         })?;
@@ -312,7 +332,9 @@ impl RawSkyMap {
             let map = at.optics("file", StokesMap::new(picture.width, picture.height, pixels))?;
             // Column centers at azimuth 2π(c + ½)/width: the middle of the (mirrored) picture is at azimuth π.
             let (s, c) = (self.center_azimuth.0 - std::f64::consts::PI).sin_cos();
-            Ok(SkyRadiance::Map(TurnedMap { map, turn: (c, s) }))
+            let file = at.resolve(&self.file);
+            let source = MapSource { file, center_azimuth: self.center_azimuth, scale };
+            Ok(SkyRadiance::Map(TurnedMap { map, turn: (c, s), source }))
         });
         Ok([r?, g?, b?])
     }

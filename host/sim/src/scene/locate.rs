@@ -1,11 +1,10 @@
-//! From a key to its line in the text, from a position in the text to its key, and refusals that carry both.
+//! Tables of a scene, and refusals that carry key and line.
 
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use toml::Spanned;
-use toml::de::{DeArray, DeTable, DeValue};
+use boards::locate::{Fault, FaultKind, place_of_key};
 
 use crate::{Place, SimError};
 
@@ -81,15 +80,11 @@ impl<'a> At<'a> {
 
     /// A parser error with its file, line and key, and its kind.
     pub(super) fn parser(&self, error: &toml::de::Error) -> SimError {
-        let place = place_at(self.file, self.text, error.span().map_or(0, |span| span.start));
-        let expected = error.message().to_owned();
-        // toml has no error kinds; these two openings are serde's own (`de::Error::unknown_field`, `unknown_variant`).
-        if expected.starts_with("unknown field") {
-            SimError::UnknownKey { place, expected }
-        } else if expected.starts_with("unknown variant") {
-            SimError::UnknownValue { place, expected }
-        } else {
-            SimError::Parse { place, expected }
+        let Fault { kind, place, expected } = Fault::new(self.file, self.text, error);
+        match kind {
+            FaultKind::Malformed => SimError::Parse { place, expected },
+            FaultKind::UnknownKey => SimError::UnknownKey { place, expected },
+            FaultKind::UnknownValue => SimError::UnknownValue { place, expected },
         }
     }
 
@@ -100,79 +95,4 @@ impl<'a> At<'a> {
             (false, false) => format!("{}.{key}", self.table),
         }
     }
-}
-
-/// Where the dotted `key` stands; where it is absent, the nearest table above it that is present.
-fn place_of_key(file: &Path, text: &str, key: &str) -> Place {
-    let (root, _) = DeTable::parse_recoverable(text);
-    let mut table = Some(root.get_ref());
-    let mut list: Option<&DeArray<'_>> = None;
-    let mut offset = 0;
-    for part in key.split('.') {
-        let value = if let Some(inside) = table {
-            let Some((name, value)) = inside.get_key_value(part) else { break };
-            offset = name.span().start;
-            value
-        } else {
-            let entry = list.and_then(|entries| entries.get(part.parse::<usize>().ok()?));
-            let Some(value) = entry else { break };
-            offset = Spanned::span(value).start;
-            value
-        };
-        (table, list) = match value.get_ref() {
-            DeValue::Table(inner) => (Some(inner), None),
-            DeValue::Array(entries) => (None, Some(entries)),
-            _ => (None, None),
-        };
-    }
-    Place { file: file.to_path_buf(), line: line_of(text, offset), key: key.to_owned() }
-}
-
-/// The line of byte `offset`, and the innermost key whose own text or value covers it.
-fn place_at(file: &Path, text: &str, offset: usize) -> Place {
-    let (root, _) = DeTable::parse_recoverable(text);
-    let mut innermost = Innermost { offset, length: usize::MAX, key: String::new() };
-    innermost.search_table(root.get_ref(), "");
-    Place { file: file.to_path_buf(), line: line_of(text, offset), key: innermost.key }
-}
-
-struct Innermost {
-    offset: usize,
-    length: usize,
-    key: String,
-}
-
-impl Innermost {
-    fn search_table(&mut self, table: &DeTable<'_>, prefix: &str) {
-        for (name, value) in table.iter() {
-            let key =
-                if prefix.is_empty() { name.get_ref().to_string() } else { format!("{prefix}.{}", name.get_ref()) };
-            self.offer(name.span(), &key);
-            self.search_value(value, &key);
-        }
-    }
-
-    fn search_value(&mut self, value: &Spanned<DeValue<'_>>, key: &str) {
-        self.offer(Spanned::span(value), key);
-        match value.get_ref() {
-            DeValue::Table(inner) => self.search_table(inner, key),
-            DeValue::Array(entries) => {
-                for (index, entry) in entries.iter().enumerate() {
-                    self.search_value(entry, &format!("{key}.{index}"));
-                }
-            }
-            _ => {}
-        }
-    }
-
-    fn offer(&mut self, span: std::ops::Range<usize>, key: &str) {
-        if span.contains(&self.offset) && span.len() < self.length {
-            self.length = span.len();
-            key.clone_into(&mut self.key);
-        }
-    }
-}
-
-fn line_of(text: &str, offset: usize) -> usize {
-    1 + text.bytes().take(offset).filter(|byte| *byte == b'\n').count()
 }

@@ -22,7 +22,7 @@ use serde::Deserialize;
 
 pub use bumps::Bumps;
 pub use device::{Approach, Camera, Exposure, Plan, Polarizer, Wheel};
-pub use light::{Light, SkyBand, SkyPattern, SkyRadiance, TurnedMap};
+pub use light::{Light, MapSource, SkyBand, SkyPattern, SkyRadiance, TurnedMap};
 pub use sample::{Layout, Patch, Sample};
 pub use surface::{Field, Index, Normals, Surface, SurfacePoint};
 pub use texture::Texture;

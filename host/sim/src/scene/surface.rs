@@ -9,7 +9,7 @@ use super::bumps::{Bumps, RawBumps};
 use super::locate::At;
 use super::texture::{RawMap, Texture};
 use super::value::Bands;
-use crate::SimError;
+use crate::{Place, SimError};
 
 /// A number (or one per band) that is the same everywhere, or a map over the sample.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,6 +58,8 @@ pub struct Surface {
     pub alpha: Field<f64>,
     /// Which way it faces.
     pub normals: Normals,
+    /// Where its map of α or η stands; without one, the surface itself.
+    pub map_place: Place,
 }
 
 /// What the renderer needs to know of one point of the sample.
@@ -142,6 +144,11 @@ impl RawSurface {
             ior: self.ior(at)?,
             alpha: self.alpha(at)?,
             normals: self.normals(at, seed, which)?,
+            map_place: at.place(match (&self.alpha_map, &self.eta_map) {
+                (Some(_), _) => "alpha_map",
+                (None, Some(_)) => "eta_map",
+                (None, None) => "",
+            }),
         })
     }
 

@@ -46,6 +46,11 @@ impl Texture {
         (self.width, self.height)
     }
 
+    /// Whether all three bands are the same.
+    pub(crate) fn is_grey(&self) -> bool {
+        self.channels == 1
+    }
+
     /// Smallest and largest sample.
     #[must_use]
     pub fn range(&self) -> (f64, f64) {

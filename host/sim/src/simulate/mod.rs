@@ -6,18 +6,24 @@
 
 mod optical_scene;
 
+use crate::{Effect, EffectSet};
 use std::time::{Duration, Instant};
 
 use host_image::{Color, ColorPlanes, StokesImage, StokesMetadata};
 
 use crate::SimError;
 use crate::camera::Truth;
-use crate::optical::{
-    EffectSet, Evaluation, Method, OpticalEffect, OpticalFacts, PixelMap, Renderer, SurfaceReport, Survey,
-};
+use crate::optical::{Evaluation, Method, OpticalFacts, PixelMap, Renderer, SurfaceReport, Survey};
 use crate::planner::{Plan, camera_noise, difference};
 use crate::scene::Scene;
 use optical_scene::{OpticalScene, Rays};
+
+/// Share of the tolerance that surfaces of constant α and η may lose where they stand for maps.
+const MAP_SHARE: f64 = 0.2;
+
+/// Part of what maps and effects left out have not used up that interpolation may err by. Two pictures are compared, so half
+/// would be all of it; the rest is for pixels between those at which interpolation was measured.
+const EVALUATION_PART: f64 = 1.0 / 3.0;
 
 /// What one view of a scene sends into the camera.
 #[derive(Clone, Debug)]
@@ -28,7 +34,9 @@ pub struct Simulation {
     pub truth: Truth,
     /// Which effects are in the image, and why.
     pub plan: Plan,
-    /// How each surface was evaluated; a map of α is several, each once for the pixels above it and once for those below.
+    /// At most this is lost where surfaces of constant α and η stand for maps, relative to s0; 0 without such maps.
+    pub map_bound: f64,
+    /// How each surface was evaluated; a map of α or η is several.
     pub surfaces: Vec<SurfaceReport>,
     /// Wall time.
     pub timing: Timing,
@@ -53,7 +61,7 @@ pub struct Verification {
     /// The image against the full one.
     pub planned: Difference,
     /// The full image without one effect, against the full one; those the scene has.
-    pub alone: Vec<(OpticalEffect, Difference)>,
+    pub alone: Vec<(Effect, Difference)>,
     /// Wall time of the full image.
     pub full: Duration,
 }
@@ -82,15 +90,15 @@ pub fn noise_of(scene: &Scene) -> f64 {
 /// some ten times the work.
 ///
 /// # Errors
-/// [`SimError::NoView`]; [`SimError::Tolerance`] outside (0, 1]; [`SimError::NotSimulated`] with the key of the scene for a map of
-/// refractive indices, and for a surface smoother than the sun's disk; [`SimError::Physics`].
+/// [`SimError::NoView`]; [`SimError::Tolerance`] outside (0, 1]; [`SimError::NotSimulated`] with the place in the scene for maps
+/// that call for too many levels; [`SimError::Physics`].
 pub fn simulate(scene: &Scene, view: usize, tolerance: f64, verify: bool) -> Result<Simulation, SimError> {
     let camera = scene.views.get(view).ok_or(SimError::NoView { view, views: scene.views.len() })?;
     if !(tolerance > 0.0 && tolerance <= 1.0) {
         return Err(SimError::Tolerance(tolerance));
     }
-    let optical = OpticalScene::of(scene)?;
     let start = Instant::now();
+    let optical = OpticalScene::of(scene, MAP_SHARE * tolerance)?;
     let truth = Truth::of(&scene.sample, camera);
     let rays = optical.rays(camera, &truth);
     let in_truth = start.elapsed();
@@ -98,7 +106,10 @@ pub fn simulate(scene: &Scene, view: usize, tolerance: f64, verify: bool) -> Res
     let start = Instant::now();
     let maps = rays.maps();
     let facts = OpticalFacts::new(&optical.light, &optical.surfaces, &maps);
-    let plan = Plan::new(&facts, tolerance);
+    let mut plan = Plan::new(&facts, tolerance - optical.bound());
+    plan.tolerance = tolerance;
+    let spare = tolerance - optical.bound() - plan.bound;
+    plan.evaluation = Evaluation::Prefiltered { tolerance: EVALUATION_PART * spare };
     let planning = start.elapsed();
 
     let picture = Picture { optical: &optical, rays: &rays, surveys: facts.surveys(), evaluation: plan.evaluation };
@@ -111,7 +122,7 @@ pub fn simulate(scene: &Scene, view: usize, tolerance: f64, verify: bool) -> Res
         metadata: metadata(scene, view),
     };
     let timing = Timing { truth: in_truth, planning, rendering };
-    Ok(Simulation { image, truth, plan, surfaces, timing, verification })
+    Ok(Simulation { image, truth, plan, map_bound: optical.bound(), surfaces, timing, verification })
 }
 
 /// (R, G, B)(s0, s1, s2) of every pixel.
@@ -126,11 +137,10 @@ struct Picture<'a> {
 }
 
 impl Rays {
-    /// The pictures that are rendered, one or two.
+    /// The pictures that are rendered.
     fn maps(&self) -> Vec<PixelMap<'_>> {
         let map = |pixels| PixelMap { width: self.width, camera_x: self.camera_x, pixels };
-        let upper = self.upper.as_ref().map(|(pixels, _)| map(pixels.as_slice()));
-        std::iter::once(map(self.lower.as_slice())).chain(upper).collect()
+        self.layers.iter().map(|layer| map(layer.pixels.as_slice())).collect()
     }
 }
 
@@ -141,12 +151,14 @@ impl Picture<'_> {
         let maps = self.rays.maps();
         let mut renderings = maps.iter().zip(self.surveys).map(|(map, survey)| renderer.render_surveyed(map, survey));
         let (mut stokes, mut surfaces) = renderings.next().map(|r| (r.stokes, r.surfaces)).unwrap_or_default();
-        if let (Some(above), Some((_, shares))) = (renderings.next(), &self.rays.upper) {
-            for ((below, above), share) in stokes.iter_mut().zip(&above.stokes).zip(shares) {
-                let pairs = below.as_flattened_mut().iter_mut().zip(above.as_flattened());
-                pairs.for_each(|(a, b)| *a += share * (b - *a));
+        if let [first, others @ ..] = self.rays.layers.as_slice()
+            && !others.is_empty()
+        {
+            scale(&mut stokes, &first.shares);
+            for (rendering, layer) in renderings.zip(others) {
+                add(&mut stokes, &rendering.stokes, &layer.shares);
+                surfaces.extend(rendering.surfaces);
             }
-            surfaces.extend(above.surfaces);
         }
         surfaces.retain(|s| s.method != Method::Absent);
         Ok((stokes, surfaces, start.elapsed()))
@@ -164,6 +176,22 @@ impl Picture<'_> {
             alone.push((row.effect, against(&without, time)));
         }
         Ok(Verification { planned: against(planned, time), alone, full: full_time })
+    }
+}
+
+/// Each pixel by its share.
+fn scale(pixels: &mut Pixels, shares: &[[f32; 3]]) {
+    for (pixel, share) in pixels.iter_mut().zip(shares) {
+        pixel.iter_mut().zip(share).for_each(|(band, share)| band.iter_mut().for_each(|s| *s *= share));
+    }
+}
+
+/// Adds another picture, each pixel by its share.
+fn add(pixels: &mut Pixels, more: &Pixels, shares: &[[f32; 3]]) {
+    for ((pixel, more), share) in pixels.iter_mut().zip(more).zip(shares) {
+        for ((band, more), share) in pixel.iter_mut().zip(more).zip(share) {
+            band.iter_mut().zip(more).for_each(|(s, m)| *s += share * m);
+        }
     }
 }
 

@@ -8,7 +8,8 @@ use glam::{DMat3, DVec3};
 use host_optics::frames::Turn;
 use host_optics::sky::{StokesMap, Uniform};
 use host_optics::{Frame, Ggx, Ior, Masking};
-use host_sim::optical::{Body, EffectSet, Evaluation, Pixel, PixelMap, Radiance, Renderer, SceneLight, Surface};
+use host_sim::EffectSet;
+use host_sim::optical::{Body, Evaluation, Pixel, PixelMap, Radiance, Renderer, SceneLight, Surface};
 
 struct Capture {
     width: usize,

@@ -4,9 +4,9 @@ use glam::DVec3;
 use host_optics::sky::StokesMap;
 use host_optics::{Ggx, Ior, Masking};
 use host_sim::optical::{
-    Body, EffectSet, Evaluation, Method, OpticalEffect, Pixel, PixelMap, Radiance, Renderer, SceneLight, SkyPattern,
-    Surface,
+    Body, Evaluation, Method, Pixel, PixelMap, Radiance, Renderer, SceneLight, SkyPattern, Surface,
 };
+use host_sim::{Effect, EffectSet};
 
 /// A wavy plane under a spotted, polarized sky.
 fn picture(threads: usize, effects: EffectSet) -> (Vec<[[f32; 3]; 3]>, Method) {
@@ -50,7 +50,7 @@ fn pictures_do_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn light_stays_physical_whatever_is_left_out() {
-    for effect in OpticalEffect::ALL {
+    for effect in Effect::OPTICAL {
         let (stokes, _) = picture(2, EffectSet::ALL.without(effect));
         for [s0, s1, s2] in stokes.into_iter().flatten() {
             assert!(s0 > 0.0 && s1.hypot(s2) <= s0 * 1.001, "{}: {s0} {s1} {s2}", effect.name());

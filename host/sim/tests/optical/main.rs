@@ -5,3 +5,4 @@ mod captures;
 mod laws;
 mod oracles;
 mod shared;
+mod sun;

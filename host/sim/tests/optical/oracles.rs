@@ -4,9 +4,8 @@ use crate::shared::{json, numbers};
 use glam::DVec3;
 use host_optics::sky::ClearSky;
 use host_optics::{Ggx, Ior, Masking};
-use host_sim::optical::{
-    Body, EffectSet, Evaluation, Pixel, PixelMap, Radiance, Renderer, SceneLight, SkyPattern, Surface,
-};
+use host_sim::EffectSet;
+use host_sim::optical::{Body, Evaluation, Pixel, PixelMap, Radiance, Renderer, SceneLight, SkyPattern, Surface};
 
 #[test]
 fn single_pixels_meet_the_tabulated_integrals() {

@@ -46,6 +46,24 @@ impl Interval {
         Self { low: self.low.max(0.0).sqrt(), high: self.high.max(0.0).sqrt() }
     }
 
+    /// The smallest interval around both.
+    pub(crate) fn hull(self, o: Self) -> Self {
+        Self { low: self.low.min(o.low), high: self.high.max(o.high) }
+    }
+
+    pub(crate) fn offset(self, k: f64) -> Self {
+        Self { low: self.low + k, high: self.high + k }
+    }
+
+    pub(crate) fn clamp(self, low: f64, high: f64) -> Self {
+        Self { low: self.low.clamp(low, high), high: self.high.clamp(low, high) }
+    }
+
+    /// f of both ends, for f that grows.
+    pub(crate) fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        Self { low: f(self.low), high: f(self.high) }
+    }
+
     pub(crate) fn exp(self) -> Self {
         Self { low: self.low.exp(), high: self.high.exp() }
     }

@@ -22,7 +22,7 @@ pub(crate) fn assess(facts: &OpticalFacts<'_>) -> Assessment {
     let degrees = worst.fold(0.0, f64::max).to_degrees();
     let reason =
         format!("light is polarized up to {p:.2}: azimuths of mirror facets would err by {degrees:.1} degrees");
-    Assessment::new(super::share(p, p), COST_NS, reason)
+    Assessment::new(super::polarization_share(facts, p), COST_NS, reason)
 }
 
 /// The largest error, over all directions of incident polarization, of reading a mirror facet's azimuth off the angle of

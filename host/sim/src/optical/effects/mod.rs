@@ -10,6 +10,8 @@ pub mod retardance;
 pub mod roughness;
 pub mod sun_disk;
 
+use crate::optical::{OpticalFacts, Sun, SurfaceExtent};
+
 /// A change of (Q, U)/L by `moved` as a share of s0 under light of degree of polarization up to `dolp`.
 fn share(moved: f64, dolp: f64) -> f64 {
     if moved == 0.0 {
@@ -19,6 +21,24 @@ fn share(moved: f64, dolp: f64) -> f64 {
     } else {
         f64::INFINITY
     }
+}
+
+/// The least n·ω_i over a surface's normals and the sun's disk; `None` where it may be at a horizon.
+fn sun_cosine(sun: &Sun, extent: &SurfaceExtent) -> Option<f64> {
+    let direction = host_optics::frames::direction(sun.direction).ok()?;
+    let radius = sun.angular_radius_rad;
+    let cosine = direction.dot(extent.mean_normal) - extent.normal_radius - radius - 1e-6;
+    (cosine > 0.0 && direction.z > radius.sin()).then_some(cosine)
+}
+
+/// A change of (Q, U)/L by `moved` at most as a share of s0, with the least of two proofs: [`share`] of every facet and the body, and the
+/// enclosures of both against that of s0, which knows that unpolarized light from the body dilutes it.
+fn polarization_share(facts: &OpticalFacts<'_>, moved: f64) -> f64 {
+    let bare = share(moved, facts.bounds.max_dolp);
+    if facts.shown().any(|(s, _)| s.is_mirror()) {
+        return bare;
+    }
+    bare.min(facts.enclosed(|e| e.share(moved * (e.lobe.most + e.body.tint))))
 }
 
 /// Shares of a lobe's reach at which bounds are tried.

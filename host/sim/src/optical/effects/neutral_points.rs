@@ -1,14 +1,14 @@
 //! Neutral points of the sky; left out, Berry's pattern is replaced by Rayleigh's of the same sun and P_max.
 
-use crate::Assessment;
-use crate::optical::{EffectSet, OpticalEffect, OpticalFacts, SkyPattern};
+use crate::optical::{OpticalFacts, SkyPattern};
+use crate::{Assessment, Effect, EffectSet};
 
 const COST_NS: f64 = 2.0;
 
 /// The pattern a set of effects leaves.
 pub(crate) fn pattern(pattern: Option<SkyPattern>, effects: EffectSet) -> Option<SkyPattern> {
     match pattern {
-        Some(SkyPattern::Berry { sun, max_dolp, .. }) if !effects.contains(OpticalEffect::NeutralPoints) => {
+        Some(SkyPattern::Berry { sun, max_dolp, .. }) if !effects.contains(Effect::NeutralPoints) => {
             Some(SkyPattern::Rayleigh { sun, max_dolp })
         }
         other => other,
@@ -25,5 +25,5 @@ pub(crate) fn assess(facts: &OpticalFacts<'_>) -> Assessment {
     };
     let moved = 2.0 * max_dolp * (0.5 * splitting_deg.to_radians()).sin().powi(2);
     let reason = format!("(Q, U)/L moves by at most {moved:.3} for a splitting of {splitting_deg} degrees");
-    Assessment::new(super::share(moved, max_dolp), COST_NS, reason)
+    Assessment::new(super::polarization_share(facts, moved), COST_NS, reason)
 }

@@ -4,14 +4,8 @@
 use crate::Assessment;
 use crate::optical::OpticalFacts;
 use host_optics::Ior;
-use protocol_polar::Reflectance;
 
 const COST_NS: f64 = 1.0;
-
-/// The reflection with δ = 180°.
-pub(crate) fn left_out(r: Reflectance) -> Reflectance {
-    Reflectance { rr_cos_delta: -(r.perpendicular * r.parallel).sqrt(), rr_sin_delta: 0.0, ..r }
-}
 
 /// Only diagonal light is touched: |Δ(s1, s2)| <= √(R⊥R∥) (1 + cos δ) P L <= 2 R P L, of an s0 of at least R L (1 − P).
 pub(crate) fn assess(facts: &OpticalFacts<'_>) -> Assessment {

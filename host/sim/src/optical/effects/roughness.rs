@@ -1,7 +1,8 @@
 //! Facets spread the reflection over a lobe; left out, every pixel is a mirror (paper eq. 8), evaluated in closed form.
 
 use crate::Assessment;
-use crate::optical::bounds::{Lobe, MirrorBox};
+use crate::optical::bounds::{Interval, Lobe, MirrorBox};
+use crate::optical::facts::Enclosure;
 use crate::optical::{OpticalFacts, Radiance, Surface, SurfaceExtent};
 use glam::DVec3;
 use host_optics::Ior;
@@ -25,23 +26,41 @@ const CELLS: u8 = 3;
 pub(crate) fn assess(facts: &OpticalFacts<'_>) -> Assessment {
     let roughest = facts.shown().map(|(s, _)| s.ggx.alpha()).fold(0.0, f64::max);
     let p = facts.bounds.max_dolp;
-    let bare = if facts.light.sun.is_some() || p >= 1.0 {
+    if facts.shown().all(|(s, _)| s.is_mirror()) {
+        return Assessment::new(0.0, COST_NS, "every surface is a mirror".into());
+    }
+    let bound = if facts.light.sun.is_some() || p >= 1.0 {
         f64::INFINITY
     } else {
-        facts.worst(|surface, extent, lobe| bound(facts, surface, extent, lobe))
+        let bare = facts.worst(|surface, extent, lobe| bound(facts, surface, extent, lobe));
+        let polarized = super::share(p, p);
+        let smooth = if p > 0.0 { polarized + (1.0 + polarized) * (bare + p * (1.0 + bare)) } else { bare };
+        smooth.min(facts.enclosed(|e| enclosed(e, p)))
     };
-    let polarized = super::share(p, p);
-    let bound = if p > 0.0 { polarized + (1.0 + polarized) * (bare + p * (1.0 + bare)) } else { bare };
     Assessment::new(bound, COST_NS, format!("GGX alpha up to {roughest}"))
 }
 
+/// Of any roughness and light: the enclosures of the rough picture and of the mirror's, as far apart as they may be. s1 and s2 in the
+/// frame of the pixel's plane of incidence, where a mirror has no s2 under unpolarized light; polarized light adds up to P times
+/// s0 to either.
+fn enclosed(e: &Enclosure, p: f64) -> f64 {
+    let apart = |a: [f64; 2], b: Interval| (a[1] - b.low).max(b.high - a[0]);
+    let [power, polarized] = e.mirror;
+    let s0 = apart([e.lobe.least, e.lobe.most], power);
+    let rest = apart(e.lobe.along, polarized).hypot(e.lobe.across) + p * (e.lobe.most + power.high);
+    e.share(s0.max(rest))
+}
+
 fn bound(facts: &OpticalFacts<'_>, surface: &Surface, extent: &SurfaceExtent, lobe: &Lobe<'_>) -> f64 {
+    if surface.is_mirror() {
+        return 0.0;
+    }
     if surface.ggx.alpha() > ROUGHEST || lobe.reach <= 0.0 || extent.view_radius > 0.5 {
         return f64::INFINITY;
     }
     let gray = surface.ior[0] == surface.ior[1] && surface.ior[1] == surface.ior[2];
     let [r, g, b] = &facts.light.radiance;
-    let bands = if gray && r == g && g == b { 1 } else { 3 };
+    let bands = if gray && r.proportional(g) && r.proportional(b) { 1 } else { 3 };
     let of_band = |k: usize| {
         let Ior::Dielectric(ior) = surface.ior[k] else { return f64::INFINITY };
         let mut worst = 0.0_f64;

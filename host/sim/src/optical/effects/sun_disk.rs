@@ -1,8 +1,9 @@
 //! The sun's disk; left out, all of its power comes from its center.
 
-use crate::Assessment;
 use crate::optical::light::SunPoints;
-use crate::optical::{EffectSet, OpticalEffect, OpticalFacts, Sun, Surface, SurfaceExtent};
+use crate::optical::{OpticalFacts, Sun, Surface, SurfaceExtent};
+use crate::{Assessment, Effect, EffectSet};
+use host_optics::prefilter::Sources;
 use host_optics::{Ior, OpticsError, frames};
 
 const COST_NS: f64 = 5.0;
@@ -12,23 +13,31 @@ const COST_NS: f64 = 5.0;
 pub(crate) fn points(sun: Option<&Sun>, effects: EffectSet) -> Result<SunPoints, OpticsError> {
     let Some(sun) = sun else { return Ok(SunPoints::default()) };
     let disk = sun.disk()?;
-    let points = if effects.contains(OpticalEffect::SunDisk) {
+    let center = frames::direction(sun.direction)?;
+    let points = if effects.contains(Effect::SunDisk) {
         disk.points()
     } else {
         let solid_angle = core::f64::consts::PI * sun.angular_radius_rad.sin().powi(2);
-        vec![(frames::direction(sun.direction)?, solid_angle)]
+        vec![(center, solid_angle)]
     };
-    Ok(SunPoints { points, disk: Some(disk), radiance: sun.radiance })
+    let angular_radius = sun.angular_radius_rad;
+    let sources = Sources { points, radiance: sun.radiance };
+    Ok(SunPoints { sources, disk: Some(disk), center, angular_radius })
 }
 
-/// Over a disk of radius ρ every factor of the lobe changes by at most a known exponent against its center:
-/// - D: |d ln D/dθ_h| <= 2/α, and h turns by at most ρ/(2 cos θ_d);
-/// - G2 (n·ω_i) and the transmittance, log-derivatives by n·ω_i of at most 1/c_i and 2/c_i: three times ln(c_i/(c_i − ρ));
-/// - R⊥: |d ln R⊥/dθ| <= 4/√(η² − 1), θ_d turns by at most ρ/2.
+/// Both have the same irradiance at a pixel that sees all of the disk, so that they differ by the average of f over the disk, weights
+/// cos θ, against f at its center. Along a great circle through the center f(δ) = f(0) + δ f′(0) + ½ δ² f″: opposite points cancel f′, and
+/// the average of δ² is at most ½ ρ² (to ρ² of itself). So the change is at most ¼ ρ² sup |f″|, and sup |f″|/f <= a² + b with the first and
+/// second logarithmic derivatives a, b of all factors together:
+/// - D: |d ln D/dθ_h| <= 2/α and |d² ln D/dθ_h²| <= 4/α² + 4, and h turns by at most 1/(2 cos θ_d) per radian, itself turning by
+///   no more than 1/(2 cos² θ_d);
+/// - G2 and the transmittance, log-derivatives by n·ω_i of at most 1/c_i and 2/c_i, second ones of at most twice their squares;
+/// - R⊥: |d ln R⊥/dθ| <= 4/√(η² − 1), θ_d turns by ½ per radian; second of at most its square.
 ///
-/// The polarized part besides by |Δt| <= 4η²/(√(η² − 1) min(1, η² − 1)) ρ/2 and by the turn of its plane, whose degree of
-/// polarization times 2Δφ is at most 4η/min(1, η² − 1) ρ. First order in ρ where the truth is second: for α of 0.1 some twenty
-/// times too large.
+/// The polarized part has besides the factor t (|t′| <= 4η²/(√(η² − 1) min(1, η² − 1)) at θ_d) and the turn of its plane, whose degree of
+/// polarization times 2φ′ is at most 4η/min(1, η² − 1): they count as further logarithmic derivatives. The point's
+/// solid angle π sin² ρ is the disk's but for ¼ ρ² of itself: 1 more in b. f at the center is at
+/// most exp(a ρ) of what the disk sends.
 pub(crate) fn assess(facts: &OpticalFacts<'_>) -> Assessment {
     let Some(sun) = facts.light.sun else {
         return Assessment::new(0.0, COST_NS, "no sun apart from the sky".into());
@@ -40,11 +49,16 @@ pub(crate) fn assess(facts: &OpticalFacts<'_>) -> Assessment {
 }
 
 fn bound(sun: &Sun, surface: &Surface, extent: &SurfaceExtent) -> f64 {
+    // A mirror sees the disk in either case.
+    if surface.is_mirror() {
+        return 0.0;
+    }
     let rho = sun.angular_radius_rad;
-    let Ok(direction) = frames::direction(sun.direction) else { return f64::INFINITY };
-    let cosine = direction.dot(extent.mean_normal) - extent.normal_radius - rho;
+    let (Some(cosine), Ok(direction)) = (super::sun_cosine(sun, extent), frames::direction(sun.direction)) else {
+        return f64::INFINITY;
+    };
     let half = 0.5 * ((direction + extent.mean_view).length() - extent.view_radius - rho);
-    if cosine <= rho || half <= 0.0 || direction.z <= rho.sin() {
+    if half <= 0.0 {
         return f64::INFINITY;
     }
     let mut worst = 0.0_f64;
@@ -55,13 +69,16 @@ fn bound(sun: &Sun, surface: &Surface, extent: &SurfaceExtent) -> f64 {
         if floor <= 0.0 {
             return f64::INFINITY;
         }
-        let exponent = (2.0 / surface.ggx.alpha()) * rho / (2.0 * half)
-            + 3.0 * (cosine / (cosine - rho)).ln()
-            + 2.0 * rho / contrast.sqrt()
-            + rho * rho;
-        let turned = rho * (2.0 * ior.eta().powi(2) / (contrast.sqrt() * floor) + 4.0 * ior.eta() / floor);
-        // Of the center's s0, and the picture's own s0 is at least e^(−exponent) of it.
-        worst = worst.max(((exponent.exp_m1()) * (1.0 + turned) + turned) * exponent.exp());
+        let alpha = surface.ggx.alpha();
+        let turned = 2.0 * ior.eta().powi(2) / (contrast.sqrt() * floor) + 4.0 * ior.eta() / floor;
+        let a = 1.0 / (alpha * half) + 3.0 / cosine + 2.0 / contrast.sqrt() + turned;
+        let b = (1.0 / (alpha * alpha) + 1.0) / (half * half)
+            + 1.0 / (alpha * half * half)
+            + 6.0 / (cosine * cosine)
+            + 4.0 / contrast
+            + turned * turned
+            + 1.0;
+        worst = worst.max(0.25 * rho * rho * (a * a + b) * (1.0 + rho * rho) * (2.0 * a * rho).exp());
     }
     worst
 }
