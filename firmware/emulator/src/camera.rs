@@ -2,8 +2,8 @@
 
 use crate::replay::{ReplayCamera, ReplayWheel};
 use crate::{
-    AnalyticCamera, BoardWheel, Clock, EmulatedAs5600, EmulatedServo, EmulatorError, MemoryStore, Port, Source, World,
-    setup, uniform, wheel_chart,
+    AnalyticCamera, BoardWheel, Clock, EmulatedAs5600, EmulatedServo, EmulatorError, Eye, LiveCamera, MemoryStore,
+    Port, Source, World, setup, uniform, wheel_chart,
 };
 use boards::{Board, Encoder, EncoderChip};
 use firmware_core::kernel::WeightTable;
@@ -14,6 +14,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
+
+/// The wheel of a board whose chips are emulated.
+pub type EmulatedWheel = BoardWheel<EmulatedServo, EmulatedAs5600>;
 
 /// How long to look away when there is nothing to do.
 const IDLE: Duration = Duration::from_micros(200);
@@ -63,18 +66,36 @@ pub fn start(
     }
 }
 
-impl Camera<BoardWheel<EmulatedServo, EmulatedAs5600>, AnalyticCamera> {
+/// As [`start`], with the pictures of `eye` ([`Camera::live`]).
+///
+/// # Errors
+/// [`EmulatorError`].
+pub fn start_live(board: &Board, eye: Eye, clock: Clock, port: impl Port + 'static) -> Result<Running, EmulatorError> {
+    Camera::live(board, World::new(board, clock), eye)?.booted().spawn(port)
+}
+
+impl Camera<EmulatedWheel, AnalyticCamera> {
     /// The board's own camera and wheel before `field` (see [`AnalyticCamera::new`]).
     ///
     /// # Errors
     /// [`EmulatorError::Servo`].
     pub fn analytic(board: &Board, field: Vec<[f32; 3]>, clock: Clock) -> Result<Self, EmulatorError> {
         let world = World::new(board, clock.clone());
-        let servo = EmulatedServo::new(world.clone(), board.wheel.servo.pwm_period_us);
-        let encoder = board.wheel.encoder.clone().unwrap_or_else(nothing_on_the_bus);
-        let chip = EmulatedAs5600::new(world.clone(), encoder);
-        let wheel = BoardWheel::new(board, servo, chip, clock.clone())?;
+        let wheel = emulated_wheel(board, &world)?;
         Ok(Self::of(board, wheel, AnalyticCamera::new(board, world, field), clock))
+    }
+}
+
+impl Camera<EmulatedWheel, LiveCamera> {
+    /// The board's own wheel, as it stands in `world`, before a sensor with the pictures of `eye`; the board must say what
+    /// sensor that is.
+    ///
+    /// # Errors
+    /// [`EmulatorError::Servo`].
+    pub fn live(board: &Board, world: World, eye: Eye) -> Result<Self, EmulatorError> {
+        let (wheel, clock) = (emulated_wheel(board, &world)?, world.clock().clone());
+        let sensor = LiveCamera::new(world, board.sensor.width_px as usize, eye);
+        Ok(Self::of(board, wheel, sensor, clock))
     }
 }
 
@@ -183,6 +204,14 @@ impl Drop for Running {
     fn drop(&mut self) {
         self.halt();
     }
+}
+
+/// The wheel of a board, with emulated chips that share `world`.
+fn emulated_wheel(board: &Board, world: &World) -> Result<EmulatedWheel, EmulatorError> {
+    let servo = EmulatedServo::new(world.clone(), board.wheel.servo.pwm_period_us);
+    let encoder = board.wheel.encoder.clone().unwrap_or_else(nothing_on_the_bus);
+    let chip = EmulatedAs5600::new(world.clone(), encoder);
+    BoardWheel::new(board, servo, chip, world.clock().clone())
 }
 
 /// For a board without an encoder: its wheel never asks.

@@ -13,6 +13,7 @@ mod camera;
 mod clock;
 mod error;
 mod light;
+mod live;
 mod noise;
 mod port;
 mod replay;
@@ -26,12 +27,13 @@ mod world;
 
 pub use analytic::{AnalyticCamera, FixedPattern, REFERENCE_EXPOSURE_US};
 pub use as5600::EmulatedAs5600;
-pub use camera::{Camera, Running, start};
+pub use camera::{Camera, EmulatedWheel, Running, start, start_live};
 pub use clock::Clock;
 pub use error::EmulatorError;
 /// What a cable to the emulated camera must be able to do.
 pub use firmware_core::{ByteLink, LinkGone};
 pub use light::Light;
+pub use live::{Exposure, Eye, LiveCamera};
 #[cfg(unix)]
 pub use port::UnixPort;
 pub use port::{Jack, Port, TcpPort, jack};

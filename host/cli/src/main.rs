@@ -8,6 +8,7 @@ mod output;
 mod photographs;
 mod pictures;
 mod report;
+mod scenes;
 mod terminal;
 
 use std::process::ExitCode;

@@ -11,6 +11,7 @@ use host_link::in_process::{DeviceEnd, pair};
 use host_link::{Address, Client, Transport};
 use protocol_wire::LogLevel;
 
+use super::scene_source::SceneSource;
 use super::words::link_failure;
 use crate::exit::Exit;
 use crate::failure::Failure;
@@ -26,8 +27,9 @@ const PIPE: usize = 1 << 20;
 pub(crate) struct DeviceArgs {
     /// The camera: usb, usb:SERIAL, tcp:HOST:PORT, unix:PATH, or emulated[:SOURCE] for one in this program
     ///
-    /// SOURCE is what the emulated camera sees: wheel-chart (the default), uniform:S0,DOLP,AOLP_DEG, or
-    /// replay:PATH[?mosaic=imx250mzr&prefix=NAME&black=DN&white=DN&bit_depth=BITS] for photographs taken at known angles.
+    /// SOURCE is what the emulated camera sees: wheel-chart (the default), uniform:S0,DOLP,AOLP_DEG,
+    /// replay:PATH[?mosaic=imx250mzr&prefix=NAME&black=DN&white=DN&bit_depth=BITS] for photographs taken at known angles, or
+    /// SCENE.toml[?view=N&seed=N&tolerance=T] for a simulated scene (see brewster simulate) with the scene's own sensor.
     #[arg(long, short, value_name = "CAMERA", default_value = "usb", verbatim_doc_comment)]
     device: DeviceName,
     /// Board file of the emulated camera [default: the one built in]
@@ -39,6 +41,7 @@ pub(crate) struct DeviceArgs {
 #[derive(Clone, Debug)]
 pub(crate) enum DeviceName {
     Emulated(Source),
+    Scene(SceneSource),
     At(Address),
 }
 
@@ -50,6 +53,9 @@ impl FromStr for DeviceName {
             return Ok(Self::Emulated(Source::default()));
         }
         if let Some(source) = name.strip_prefix("emulated:") {
+            if let Some(scene) = SceneSource::parse(source) {
+                return scene.map(Self::Scene);
+            }
             return source
                 .parse()
                 .map(Self::Emulated)
@@ -87,15 +93,18 @@ impl DeviceArgs {
                 }
                 (open_address(address)?, None)
             }
+            DeviceName::Scene(source) => {
+                let (plug, port) = jack();
+                let running = source.start(self.board()?, port)?;
+                (plugged(&plug), Some(running))
+            }
             DeviceName::Emulated(source) => {
                 let board = self.board()?;
                 let (plug, port) = jack();
                 let running = start(&board, source, Clock::virtual_time(), port).map_err(|error| {
                     Failure::new(Exit::BadInput, error.to_string(), "Check the source behind --device emulated:.")
                 })?;
-                let (host, device) = pair(PIPE);
-                plug.send(Wire(device)).ok(); // the camera that would take it has just been started
-                (Box::new(host), Some(running))
+                (plugged(&plug), Some(running))
             }
         };
         let warnings = channel();
@@ -131,6 +140,13 @@ impl Opened {
     }
 }
 
+/// Plugs a cable into an emulated camera and gives its other end.
+fn plugged(plug: &Sender<Wire>) -> Box<dyn Transport> {
+    let (host, device) = pair(PIPE);
+    plug.send(Wire(device)).ok(); // the camera that would take it has just been started
+    Box::new(host)
+}
+
 fn connect(
     transport: Box<dyn Transport>,
     warnings: &Sender<String>,
@@ -152,7 +168,7 @@ fn open_address(address: &Address) -> Result<Box<dyn Transport>, Failure> {
 impl std::fmt::Display for DeviceName {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Emulated(_) => f.write_str("the emulated camera"),
+            Self::Emulated(_) | Self::Scene(_) => f.write_str("the emulated camera"),
             Self::At(address) => address.fmt(f),
         }
     }

@@ -4,6 +4,7 @@ mod convert;
 mod deliver;
 mod device;
 mod receive;
+mod scene_source;
 mod words;
 
 pub(crate) use deliver::{Delivery, DeliveryArgs, deliver};

@@ -8,7 +8,7 @@ use host_sim::simulate::noise_of;
 use protocol_polar::Radians;
 use serde_json::{Value, json};
 
-use super::View;
+use super::{FrameVerification, View};
 
 /// A line of the table, of either half.
 struct Line {
@@ -47,6 +47,10 @@ pub(super) fn summary(view: &View) -> String {
         time(timing.planning),
         time(timing.rendering),
     );
+    if simulation.map_bound > 0.0 {
+        let bound = share(simulation.map_bound);
+        text.push_str(&format!("  maps of alpha and index: levels between which at most {bound} of s0 is lost\n"));
+    }
     if let Some(v) = &simulation.verification {
         text.push_str(&format!(
             "  true difference from the full simulation: {} of s0 at worst, {} rms; the full one took {}\n",
@@ -57,9 +61,9 @@ pub(super) fn summary(view: &View) -> String {
     }
     if let Some(frames) = &view.frames {
         let on = frames.plan.rows.iter().filter(|r| r.on).count();
-        let (count, all, bound) = (frames.count, frames.plan.rows.len(), share(frames.plan.bound));
+        let (count, all, bound) = (view.schedule.len(), frames.plan.rows.len(), share(frames.plan.bound));
         text.push_str(&format!("  {count} frames: {on} of {all} effects, at most {bound} of s0 is lost\n"));
-        if let Some((worst, _)) = &frames.verified {
+        if let Some(FrameVerification { worst, .. }) = &frames.verified {
             text.push_str(&format!(
                 "  true difference from frames with all effects: {} of s0 at worst\n",
                 share(*worst)
@@ -73,7 +77,7 @@ pub(super) fn summary(view: &View) -> String {
 pub(super) fn table(view: &View) -> String {
     let verified = view.simulation.verification.is_some();
     let columns = if verified { format!(" {:>9} {:>10}", "measured", "true") } else { String::new() };
-    let mut text = format!("  {:<22} {:>9}  {:<4}{:>8}{columns}  why\n", "effect", "bound", "", "ns/px");
+    let mut text = format!("  {:<22} {:>9}  {:<4}{:>8}{columns}  why\n", "effect", "bound", "on", "ns/px");
     let mut kept = false;
     for (title, lines) in halves(view) {
         text.push_str(&format!("  {title}\n"));
@@ -131,10 +135,10 @@ pub(super) fn json(view: &View) -> Value {
     let optical = effects(lines.next().unwrap_or_default());
     let frames = view.frames.as_ref().map(|frames| {
         json!({
-            "count": frames.count,
-            "exposures_us": frames.exposures_us,
+            "count": view.schedule.len(),
+            "exposures_us": view.schedule.iter().map(|f| f.exposure_us).collect::<Vec<_>>(),
             "bound": frames.plan.bound,
-            "true_difference": frames.verified.as_ref().map(|(worst, _)| worst),
+            "true_difference": frames.verified.as_ref().map(|v| v.worst),
             "effects": effects(lines.next().unwrap_or_default()),
         })
     });
@@ -142,6 +146,7 @@ pub(super) fn json(view: &View) -> Value {
         "view": view.index,
         "folder": format!("view-{}", view.index),
         "bound": simulation.plan.bound,
+        "map_bound": simulation.map_bound,
         "effects": optical,
         "frames": frames,
         "seconds": {
@@ -176,6 +181,7 @@ fn halves(view: &View) -> Vec<(&'static str, Vec<Line>)> {
     });
     let mut halves = vec![("optics", optical.collect())];
     if let Some(frames) = &view.frames {
+        let alone = |k: usize| frames.verified.as_ref().and_then(|v| *v.alone.get(k)?);
         let line = |(k, row): (usize, &host_sim::frames::FrameRow)| Line {
             effect: row.effect.name(),
             bound: row.assessment.bound,
@@ -183,8 +189,8 @@ fn halves(view: &View) -> Vec<(&'static str, Vec<Line>)> {
             why: row.why,
             reason: row.assessment.reason.clone(),
             estimated_ns: row.assessment.cost_ns_per_pixel,
-            measured_ns: None,
-            difference: frames.verified.as_ref().and_then(|(_, alone)| alone.get(k).copied()),
+            measured_ns: alone(k).map(|(_, ns)| ns),
+            difference: alone(k).map(|(difference, _)| difference),
         };
         halves.push(("camera, per frame", frames.plan.rows.iter().enumerate().map(line).collect()));
     }

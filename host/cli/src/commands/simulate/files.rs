@@ -53,7 +53,8 @@ pub(super) fn places(view: &View, output: &str, scene: &Scene) -> String {
     text
 }
 
-fn name(view: &View) -> String {
+/// Name of the folder of a view.
+pub(super) fn name(view: &View) -> String {
     format!("view-{}", view.index)
 }
 
@@ -76,20 +77,29 @@ fn maps(view: &View, own: &Path) -> Result<(), ImageError> {
     view.simulation.truth.pictures().par_iter().try_for_each(write)
 }
 
-/// One 16-bit grey PNG per frame, `045deg.png`; with several exposures a folder for each, with several frames of an angle
-/// `repeat-2_045deg.png`.
+/// Where each frame of a plan is, below `frames`: `frame_045deg.png`; with several exposures a folder for each, with several
+/// frames of an angle `repeat-2_045deg.png`.
+pub(super) fn frame_names(scene: &Scene, specs: &[FrameSpec]) -> Vec<String> {
+    let same_exposure = |a: &FrameSpec, b: &FrameSpec| a.exposure_us.to_bits() == b.exposure_us.to_bits();
+    let several = specs.windows(2).any(|pair| !same_exposure(&pair[0], &pair[1]));
+    let name = |(k, spec): (usize, &FrameSpec)| {
+        let folder = if several { format!("{}us/", spec.exposure_us) } else { String::new() };
+        let repeat = 1 + specs[..k].iter().filter(|s| s.angle == spec.angle && same_exposure(s, spec)).count();
+        let prefix = if scene.plan.repeats > 1 { format!("repeat-{repeat}") } else { "frame".to_owned() };
+        format!("{folder}{prefix}_{}deg.png", angle(explain::degrees(spec.commanded)))
+    };
+    specs.iter().enumerate().map(name).collect()
+}
+
+/// One 16-bit grey PNG per frame.
 fn frames(scene: &Scene, exposer: &Exposer<'_>, own: &Path) -> Result<(), ImageError> {
     let top = make(own, "frames")?;
-    let specs = exposer.frames();
-    let repeats = scene.plan.repeats;
-    let several = specs.iter().any(|s| s.exposure_us.to_bits() != specs[0].exposure_us.to_bits());
     let (width, height) = (usize::from(scene.camera.width_px), usize::from(scene.camera.height_px));
-    for (k, spec) in specs.iter().enumerate() {
-        let folder = if several { make(&top, &format!("{}us", spec.exposure_us))? } else { top.clone() };
-        let same = |s: &&FrameSpec| s.angle == spec.angle && s.exposure_us.to_bits() == spec.exposure_us.to_bits();
-        let repeat = 1 + specs[..k].iter().filter(same).count();
-        let prefix = if repeats > 1 { format!("repeat-{repeat}_") } else { "frame_".to_owned() };
-        let file = folder.join(format!("{prefix}{}deg.png", angle(explain::degrees(spec.commanded))));
+    for (k, name) in frame_names(scene, exposer.frames()).iter().enumerate() {
+        if let Some((folder, _)) = name.split_once('/') {
+            make(&top, folder)?;
+        }
+        let file = top.join(name);
         let samples = Samples::U16(exposer.raw(k));
         Picture { width, height, channels: 1, samples, encoding: Encoding::Linear }.write_png(&file)?;
     }

@@ -2,19 +2,23 @@
 
 mod explain;
 mod files;
+mod views;
 
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::time::Instant;
 
 use clap::Args;
-use host_sim::frames::{Exposer, FramePlan, true_difference};
+use host_image::StokesImage;
+use host_sim::frames::{Exposer, FramePlan, FrameSpec, true_difference};
 use host_sim::simulate::{Simulation, noise_of, simulate};
-use host_sim::{EffectSet, Facts, Scene, SimError};
+use host_sim::{Effect, EffectSet, Facts, Scene, SimError};
 use serde_json::{Value, json};
 
 use crate::exit::Exit;
 use crate::failure::Failure;
 use crate::output::{OutputArgs, OutputFolder};
+use crate::scenes::{Tolerance, refused};
 use crate::terminal::{Outcome, Terminal};
 
 /// Simulate what a camera sees of a scene: noise-free Stokes images, ground truth, raw frames
@@ -22,7 +26,7 @@ use crate::terminal::{Outcome, Terminal};
 /// A scene file (TOML) says what is looked at, from where, in what light and with which camera. Only the effects that can
 /// matter at the tolerance are simulated; each has a proved bound of what leaving it out changes. Writes a folder for each view
 /// with stokes.exr, previews, a page to look at (report.html), maps of the truth (truth/*.exr) and, with --frames, what the
-/// camera would have stored.
+/// camera would have stored; beside them views.json with cameras, light and exposures for whoever fits the pictures.
 #[derive(Args)]
 pub(crate) struct Simulate {
     /// The scene file
@@ -33,7 +37,7 @@ pub(crate) struct Simulate {
     /// Largest error of s0, s1 and s2 against the full simulation, as a share of s0: a number, or a part of this camera's noise
     ///
     /// Time grows steeply below 0.005: noise/10 of an ordinary camera is about 0.0001.
-    #[arg(long, value_name = "T|noise|noise/N", default_value = "0.005")]
+    #[arg(long, value_name = "T|noise|noise/N", default_value_t)]
     tolerance: Tolerance,
     /// Print which effects are simulated, and why
     #[arg(long)]
@@ -58,14 +62,6 @@ enum Views {
     One(usize),
 }
 
-/// How exact.
-#[derive(Clone, Copy)]
-enum Tolerance {
-    Share(f64),
-    /// The camera's noise divided by this.
-    Noise(f64),
-}
-
 /// Of a picture.
 #[derive(Clone, Copy)]
 struct Size {
@@ -77,16 +73,15 @@ struct Size {
 struct View {
     index: usize,
     simulation: Simulation,
+    /// The frames of the plan, whether they are written or not; none where there is no light to expose for.
+    schedule: Vec<FrameSpec>,
     frames: Option<Frames>,
 }
 
 /// The frames of a view.
 struct Frames {
     plan: FramePlan,
-    exposures_us: Vec<f64>,
-    count: usize,
-    /// Of the planned frames, and of those without one effect, against those with all.
-    verified: Option<(f64, Vec<f64>)>,
+    verified: Option<FrameVerification>,
 }
 
 impl FromStr for Views {
@@ -97,20 +92,6 @@ impl FromStr for Views {
             return Ok(Self::All);
         }
         text.parse().map(Self::One).map_err(|_| "expected a number from 0, or all".to_owned())
-    }
-}
-
-impl FromStr for Tolerance {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || "expected a number above 0 and at most 1, noise, or noise/10".to_owned();
-        let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| *v > 0.0 && v.is_finite()).ok_or_else(wrong);
-        match text.strip_prefix("noise") {
-            Some("") => Ok(Self::Noise(1.0)),
-            Some(part) => part.strip_prefix('/').ok_or_else(wrong).and_then(number).map(Self::Noise),
-            None => number(text).and_then(|v| if v <= 1.0 { Ok(Self::Share(v)) } else { Err(wrong()) }),
-        }
     }
 }
 
@@ -130,10 +111,7 @@ impl Simulate {
         if let Some(Size { width, height }) = self.size {
             scene = scene.resized(width, height);
         }
-        let tolerance = match self.tolerance {
-            Tolerance::Share(share) => share,
-            Tolerance::Noise(part) => (noise_of(&scene) / part).min(1.0),
-        };
+        let tolerance = self.tolerance.of(&scene);
         let chosen: Vec<usize> = match self.view {
             Views::All => (0..scene.views.len()).collect(),
             Views::One(view) if view < scene.views.len() => vec![view],
@@ -165,21 +143,24 @@ impl Simulate {
     ) -> Result<View, Failure> {
         let failed = |e: SimError| refused(&self.scene, &e);
         let simulation = simulate(scene, index, tolerance, self.verify).map_err(failed)?;
+        let schedule = match Exposer::new(scene, index, &simulation.image, EffectSet::NONE) {
+            Ok(exposer) => exposer.frames().to_vec(),
+            Err(SimError::NoLight) if !self.frames => Vec::new(),
+            Err(error) => return Err(failed(error)),
+        };
         let mut exposer = None;
         let frames = if self.frames {
             let facts = Facts::new(scene, index, &simulation.image).map_err(failed)?;
             let plan = FramePlan::new(&facts, tolerance);
             let made = Exposer::new(scene, index, &simulation.image, plan.effects).map_err(failed)?;
-            let exposures_us = made.frames().iter().map(|f| f.exposure_us).collect();
             let verified =
-                if self.verify { Some(verify(scene, index, &simulation, &plan).map_err(failed)?) } else { None };
-            let count = made.frames().len();
+                if self.verify { Some(verify(scene, index, &simulation.image, &plan).map_err(failed)?) } else { None };
             exposer = Some(made);
-            Some(Frames { plan, exposures_us, count, verified })
+            Some(Frames { plan, verified })
         } else {
             None
         };
-        let view = View { index, simulation, frames };
+        let view = View { index, simulation, schedule, frames };
         files::write(scene, &view, exposer.as_ref(), folder, terminal)?;
         Ok(view)
     }
@@ -207,6 +188,7 @@ impl Simulate {
             "views": views.iter().map(explain::json).collect::<Vec<Value>>(),
             "warnings": terminal.warnings(),
         });
+        views::write(scene, views, &folder)?;
         let json = folder.commit(json)?;
         let output = json.get("output").and_then(|o| o.as_str()).unwrap_or_default().to_owned();
         let mut text = format!("{:<20} {}\n", "scene", scene.name);
@@ -228,33 +210,34 @@ impl Simulate {
     }
 }
 
-/// True differences of the planned frames, and of frames without one effect (0 where the scene does not have it).
-fn verify(scene: &Scene, index: usize, simulation: &Simulation, plan: &FramePlan) -> Result<(f64, Vec<f64>), SimError> {
-    let all = EffectSet::all();
-    let against = |effects| true_difference(scene, index, &simulation.image, effects, all);
-    let alone = plan.rows.iter().map(|r| if r.assessment.applies { against(all.without(r.effect)) } else { Ok(0.0) });
-    Ok((against(plan.effects)?, alone.collect::<Result<_, _>>()?))
+/// What the frames' effects really do and cost.
+struct FrameVerification {
+    /// True difference of the planned frames from those with all effects.
+    worst: f64,
+    /// What each effect by itself changes, and the time in ns per pixel of a frame that it takes among all; in the plan's order,
+    /// `None` where the scene does not have it.
+    alone: Vec<Option<(f64, f64)>>,
 }
 
-/// A scene that was refused, with what to do.
-fn refused(scene: &std::path::Path, error: &SimError) -> Failure {
-    let advice = match error {
-        SimError::Io { .. } => "Check the name and the folder you are in.",
-        SimError::UnknownSchema { .. } => "Write the scene for the schema this brewster reads, or use another version.",
-        SimError::UnknownKey { .. } => "Correct the key, or take the line out: nothing in a scene is ignored.",
-        SimError::Map { .. } => "Maps are looked for in the scene's own folder: check the name and the file.",
-        SimError::Parse { .. }
-        | SimError::UnknownValue { .. }
-        | SimError::OutOfRange { .. }
-        | SimError::Optics { .. } => "Correct this line of the scene.",
-        SimError::NotSimulated { .. } => "Change the scene: leaving it out silently would make another scene.",
-        SimError::NoLight => "Check the light of the scene, and that the view sees the sample.",
-        _ => "",
+fn verify(scene: &Scene, index: usize, image: &StokesImage, plan: &FramePlan) -> Result<FrameVerification, SimError> {
+    let all = EffectSet::ALL;
+    let time = |effects| -> Result<f64, SimError> {
+        let start = Instant::now();
+        let exposer = Exposer::new(scene, index, image, effects)?;
+        let frames = exposer.frames().len();
+        (0..frames).for_each(|frame| drop(exposer.dn(frame)));
+        Ok(1e9 * start.elapsed().as_secs_f64() / (frames * image.width * image.height) as f64)
     };
-    // These carry no place of their own.
-    let what = match error {
-        SimError::NotSimulated { .. } | SimError::NoLight => format!("{}: {error}", scene.display()),
-        _ => error.to_string(),
-    };
-    Failure::new(Exit::BadInput, what, advice)
+    let full = time(all)?;
+    let alone = plan.rows.iter().map(|row| {
+        // By itself, as its bound is: among all, a changed signal would also be another draw of noise and another rounding.
+        // Photosites are compared under their own filters, but for the filters themselves.
+        let mosaic = EffectSet::NONE.with(Effect::Bayer);
+        let (base, alone) = (mosaic.without(row.effect), mosaic.with(row.effect));
+        let difference = || true_difference(scene, index, image, base, alone);
+        let one = || Ok((difference()?, full - time(all.without(row.effect))?));
+        row.assessment.applies.then(one).transpose()
+    });
+    let alone = alone.collect::<Result<_, SimError>>()?;
+    Ok(FrameVerification { worst: true_difference(scene, index, image, plan.effects, all)?, alone })
 }
