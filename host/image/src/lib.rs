@@ -7,6 +7,7 @@
 mod atomic;
 mod error;
 mod exr_file;
+mod layers;
 mod npy;
 mod picture;
 mod preview;
@@ -14,8 +15,9 @@ mod stokes_image;
 
 pub use atomic::write_atomically;
 pub use error::{ImageError, MAX_PIXELS, NonFinite, first_non_finite};
+pub use layers::{Layers, Plane};
 pub use picture::{Encoding, Picture, Samples};
-pub use preview::{PreviewKind, PreviewOptions, aolp_color, dolp_color, preview};
+pub use preview::{Colors, PlanePreview, PreviewKind, PreviewOptions, aolp_color, dolp_color, plane_preview, preview};
 pub use stokes_image::{
     BayerPattern, Color, ColorPlanes, FRAME_CONVENTION, FixedPointFormat, StokesImage, StokesMetadata,
 };

@@ -1,16 +1,16 @@
 //! OpenEXR frames: one flat layer with `Y`, or with `R`, `G`, `B` (alpha is dropped), half or float. Linear by the
 //! format's definition.
 
+use std::collections::HashMap;
 use std::io::{BufRead, Seek};
 use std::path::Path;
 
-use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, Layer, LayerAttributes, SmallVec, WritableImage};
+use exr::prelude::FlatSamples;
 
 use super::{Encoding, Picture, Samples};
 use crate::ImageError;
-use crate::atomic::write_atomically;
 use crate::error::FileContext;
-use crate::exr_file::{self, ENCODING};
+use crate::exr_file::{self, PlaneRef};
 
 pub(super) fn read(reader: impl BufRead + Seek + Send, file: FileContext<'_>) -> Result<Picture, ImageError> {
     let mut checked = exr_file::open(reader, file)?;
@@ -52,17 +52,8 @@ pub(super) fn write(picture: &Picture, path: &Path) -> Result<(), ImageError> {
             what: "OpenEXR is written from float pictures; integers go to PNG or npy".into(),
         });
     };
-    let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = picture
-        .channel_names()
-        .iter()
-        .enumerate()
-        .map(|(i, name)| {
-            let plane = samples.iter().skip(i).step_by(picture.channels).copied().collect();
-            AnyChannel::new(*name, FlatSamples::F32(plane))
-        })
-        .collect();
-    let size = (picture.width, picture.height);
-    let layer = Layer::new(size, LayerAttributes::default(), ENCODING, AnyChannels::sort(channels));
-    let image = Image::from_layer(layer);
-    write_atomically(path, |out| image.write().to_buffered(out).map_err(|e| exr_file::write_error(path, e)))
+    let plane = |i: usize| samples.iter().skip(i).step_by(picture.channels).copied().collect::<Vec<f32>>();
+    let planes: Vec<Vec<f32>> = (0..picture.channels).map(plane).collect();
+    let channels = picture.channel_names().iter().zip(&planes).map(|(n, p)| ((*n).to_owned(), PlaneRef::F32(p)));
+    exr_file::save(path, (picture.width, picture.height), channels, HashMap::new())
 }

@@ -12,6 +12,7 @@ use embedded_graphics::pixelcolor::{Rgb888, RgbColor};
 use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
 
 use super::color::Rgb;
+use crate::{Encoding, Picture, Samples};
 
 /// Width of one character of [`Canvas::text`], in pixels.
 pub(super) const CHARACTER_WIDTH: usize = 8;
@@ -31,6 +32,12 @@ pub(super) struct Canvas {
 impl Canvas {
     pub(super) fn new(width: usize, height: usize) -> Self {
         Self { width, height, rgb: BACKGROUND.repeat(width * height) }
+    }
+
+    /// 8-bit RGB, sRGB coded.
+    pub(super) fn into_picture(self) -> Picture {
+        let (width, height) = (self.width, self.height);
+        Picture { width, height, channels: 3, samples: Samples::U8(self.rgb), encoding: Encoding::Srgb }
     }
 
     /// Sets one pixel; outside the canvas nothing happens.

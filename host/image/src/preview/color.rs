@@ -5,9 +5,11 @@
 //! - AoLP: a circle of constant lightness and chroma in OKLCh (Ottosson 2020, "A perceptual color space for image
 //!   processing"), once around for 180°: equal steps of angle look equally different, and no angle looks brighter than
 //!   another. Lightness 0.75 allows the largest chroma that stays inside sRGB at every hue (0.1275).
+//! - Signed values: blue to red through white (Brewer 2003, RdBu), distinguishable with any color vision.
+//! - Normals: (n + 1)/2 per component, as every program shows normal maps.
 //! - A photosite without a value is never given one: [`NO_VALUE`], a grey that no map above contains.
 
-use colorous::{Gradient, MAGMA, VIRIDIS};
+use colorous::{Gradient, MAGMA, RED_BLUE, VIRIDIS};
 use protocol_polar::{Flags, Radians};
 
 /// 8-bit sRGB.
@@ -52,6 +54,29 @@ pub(super) fn residual_color(relative: f64) -> Rgb {
     gradient(&MAGMA, relative)
 }
 
+/// Color of a signed value, −1 as 0, 0 as ½ and +1 as 1: blue, white, red; clamped.
+pub(super) fn signed_color(at: f64) -> Rgb {
+    gradient(&RED_BLUE, 1.0 - at)
+}
+
+/// Color of a unit normal: (n + 1)/2 per component.
+pub(super) fn normal_color(normal: [f64; 3]) -> Rgb {
+    normal.map(|n| byte(0.5 * (n + 1.0)))
+}
+
+/// Linear reflectance in [0, 1], sRGB coded.
+pub(super) fn linear_color(rgb: [f64; 3]) -> Rgb {
+    rgb.map(srgb_byte)
+}
+
+/// Color of category `index`: the hues of Okabe and Ito 2008, darker each time around.
+pub(super) fn category_color(index: usize) -> Rgb {
+    const HUES: [Rgb; 7] =
+        [[213, 94, 0], [86, 180, 233], [240, 228, 66], [0, 158, 115], [204, 121, 167], [230, 159, 0], [0, 114, 178]];
+    let shade = 0.6_f64.powi(i32::try_from(index / HUES.len()).unwrap_or(i32::MAX));
+    HUES[index % HUES.len()].map(|v| byte(f64::from(v) / 255.0 * shade))
+}
+
 /// The angle's hue, with lightness and chroma in proportion to `relative_dolp` (clamped to [0, 1]): black is
 /// unpolarized.
 pub(super) fn aolp_dolp_color(aolp: Radians, relative_dolp: f64) -> Rgb {
@@ -90,11 +115,15 @@ fn oklch_to_linear_srgb(lightness: f64, chroma: f64, hue: f64) -> [f64; 3] {
 }
 
 /// IEC 61966-2-1 coding of linear light, clamped to [0, 1], to the nearest of 256 steps.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded and clamped to 0..=255")]
 fn srgb_byte(linear: f64) -> u8 {
     let x = linear.clamp(0.0, 1.0);
-    let coded = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
-    (255.0 * coded).round() as u8
+    byte(if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 })
+}
+
+/// [0, 1] to the nearest of 256 steps, clamped.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded and clamped to 0..=255")]
+fn byte(value: f64) -> u8 {
+    (255.0 * value.clamp(0.0, 1.0)).round() as u8
 }
 
 #[cfg(test)]

@@ -8,12 +8,14 @@ mod canvas;
 mod color;
 mod field;
 mod legend;
+mod plane;
 
 use protocol_polar::{Flags, Radians, Stokes};
 
 pub use color::{aolp_color, dolp_color};
+pub use plane::{Colors, PlanePreview, plane_preview};
 
-use crate::{Encoding, ImageError, Picture, Samples, StokesImage};
+use crate::{ImageError, Picture, StokesImage};
 use color::{FLAG_COLORS, NO_FLAG, NO_VALUE, NO_VALUE_AMONG_GREYS, Rgb};
 use field::{Field, Pixel};
 use legend::{Legend, Scale, number};
@@ -90,34 +92,34 @@ pub fn preview(image: &StokesImage, kind: PreviewKind, options: PreviewOptions) 
         return Err(ImageError::NoPlane { plane: "residual" });
     }
     let field = Field::new(image, max_width);
+    let size = (field.width, field.height);
     let pixels = field.pixels.iter();
     let canvas = match kind {
         PreviewKind::Intensity => {
             let white = percentile(pixels.clone().filter_map(|p| p.stokes.map(|s| s[0])));
             let color = |p: &Pixel| p.stokes.map_or(NO_VALUE_AMONG_GREYS, |s| color::grey(s[0] / white));
-            intensity_legend(image, white).draw(&field, pixels.map(color))
+            intensity_legend(image, white).draw(size, pixels.map(color))
         }
         PreviewKind::Dolp => {
             let color = |p: &Pixel| lit(p).map_or(NO_VALUE, |s| dolp_color(s.dolp() / dolp_max));
-            dolp_legend(dolp_max).draw(&field, pixels.map(color))
+            dolp_legend(dolp_max).draw(size, pixels.map(color))
         }
         PreviewKind::Aolp => {
             let color = |p: &Pixel| polarized(p).map_or(NO_VALUE, |s| aolp_color(s.aolp()));
-            aolp_legend().draw(&field, pixels.map(color))
+            aolp_legend().draw(size, pixels.map(color))
         }
         PreviewKind::AolpDolp => {
             let color = |s: Stokes| color::aolp_dolp_color(s.aolp(), s.dolp() / dolp_max);
-            aolp_dolp_legend(dolp_max).draw(&field, pixels.map(|p| lit(p).map_or(NO_VALUE, color)))
+            aolp_dolp_legend(dolp_max).draw(size, pixels.map(|p| lit(p).map_or(NO_VALUE, color)))
         }
-        PreviewKind::Flags => flags_legend(image).draw(&field, pixels.map(|p| color::flag_color(p.flags))),
+        PreviewKind::Flags => flags_legend(image).draw(size, pixels.map(|p| color::flag_color(p.flags))),
         PreviewKind::Residual => {
             let max = percentile(pixels.clone().filter_map(|p| p.residual));
             let color = |p: &Pixel| p.residual.map_or(NO_VALUE, |r| color::residual_color(r / max));
-            residual_legend(image, max).draw(&field, pixels.map(color))
+            residual_legend(image, max).draw(size, pixels.map(color))
         }
     };
-    let (width, height) = (canvas.width, canvas.height);
-    Ok(Picture { width, height, channels: 3, samples: Samples::U8(canvas.rgb), encoding: Encoding::Srgb })
+    Ok(canvas.into_picture())
 }
 
 /// The pixel's light, if there is any.
@@ -147,11 +149,11 @@ fn percentile(values: impl Iterator<Item = f64>) -> f64 {
     if *value > 0.0 { *value } else { 1.0 }
 }
 
-fn intensity_legend(image: &StokesImage, white: f64) -> Legend {
+fn intensity_legend(image: &StokesImage, white: f64) -> Legend<'static> {
     let unit = &image.metadata.unit;
     Legend {
         title: "s0, power of the light",
-        scale: Scale::Bar { max: white, unit: unit.clone(), color: color::grey },
+        scale: Scale::Bar { min: 0.0, max: white, unit: unit.clone(), color: color::grey },
         notes: vec![
             (None, format!("white = {} {unit} (99.5th percentile)", number(white, white / 1000.0))),
             (None, "sRGB coded from linear".into()),
@@ -160,16 +162,16 @@ fn intensity_legend(image: &StokesImage, white: f64) -> Legend {
     }
 }
 
-fn dolp_legend(max: f64) -> Legend {
+fn dolp_legend(max: f64) -> Legend<'static> {
     let above = format!("{max} and above");
     Legend {
         title: "Degree of linear polarization",
-        scale: Scale::Bar { max, unit: "DoLP".into(), color: dolp_color },
+        scale: Scale::Bar { min: 0.0, max, unit: "DoLP".into(), color: dolp_color },
         notes: vec![(Some(dolp_color(1.0)), above), (Some(NO_VALUE), "no light or no value".into())],
     }
 }
 
-fn aolp_legend() -> Legend {
+fn aolp_legend() -> Legend<'static> {
     Legend {
         title: "Angle of linear polarization",
         scale: Scale::Wheel { color: |angle, distance| (distance > 0.45).then(|| aolp_color(Radians(angle))) },
@@ -180,7 +182,7 @@ fn aolp_legend() -> Legend {
     }
 }
 
-fn aolp_dolp_legend(max: f64) -> Legend {
+fn aolp_dolp_legend(max: f64) -> Legend<'static> {
     Legend {
         title: "AoLP (hue) and DoLP (value)",
         scale: Scale::Wheel { color: |angle, distance| Some(color::aolp_dolp_color(Radians(angle), distance)) },
@@ -192,11 +194,11 @@ fn aolp_dolp_legend(max: f64) -> Legend {
     }
 }
 
-fn residual_legend(image: &StokesImage, max: f64) -> Legend {
+fn residual_legend(image: &StokesImage, max: f64) -> Legend<'static> {
     let unit = &image.metadata.unit;
     Legend {
         title: "Residual of the model",
-        scale: Scale::Bar { max, unit: unit.clone(), color: color::residual_color },
+        scale: Scale::Bar { min: 0.0, max, unit: unit.clone(), color: color::residual_color },
         notes: vec![
             (None, format!("end = {} {unit} (99.5th percentile)", number(max, max / 1000.0))),
             (Some(NO_VALUE), "no value".into()),
@@ -205,18 +207,13 @@ fn residual_legend(image: &StokesImage, max: f64) -> Legend {
 }
 
 /// Counts are of the image at full size; a pixel of several colors has every flag that one of them has.
-fn flags_legend(image: &StokesImage) -> Legend {
+fn flags_legend(image: &StokesImage) -> Legend<'static> {
     let total = image.width * image.height;
     let mut all = vec![0_u8; total];
     for flags in image.colors.iter().filter_map(|c| c.flags.as_deref()) {
         all.iter_mut().zip(flags).for_each(|(sum, f)| *sum |= f);
     }
-    let share = |count: usize| {
-        let percent = 100.0 * count as f64 / total as f64;
-        // "0.00 %" is for none: a single bad photosite among millions must not read as none.
-        if count > 0 && percent < 0.01 { "<0.01 %".to_owned() } else { format!("{percent:.2} %") }
-    };
-    let line = |name: &str, count: usize| format!("{name:<15} {:>8}", share(count)).replace(' ', "\u{a0}");
+    let line = |name: &str, count: usize| format!("{name:<15} {:>8}", share(count, total)).replace(' ', "\u{a0}");
     let mut notes: Vec<(Option<Rgb>, String)> = FLAG_COLORS
         .iter()
         .map(|(flag, color)| {
@@ -227,6 +224,13 @@ fn flags_legend(image: &StokesImage) -> Legend {
     notes.push((Some(NO_FLAG), line("none", all.iter().filter(|f| **f == 0).count())));
     notes.push((None, "a pixel with several flags has the color of the first in this list".into()));
     Legend { title: "Flags", scale: Scale::Categories, notes }
+}
+
+/// A share of `total` pixels, in percent.
+fn share(count: usize, total: usize) -> String {
+    let percent = 100.0 * count as f64 / total as f64;
+    // "0.00 %" is for none: a single bad photosite among millions must not read as none.
+    if count > 0 && percent < 0.01 { "<0.01 %".to_owned() } else { format!("{percent:.2} %") }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The right color at the right place, and none where there is no value.
 
 use super::*;
-use crate::{BayerPattern, Color, ColorPlanes, StokesMetadata};
+use crate::{BayerPattern, Color, ColorPlanes, Samples, StokesMetadata};
 use protocol_polar::Degrees;
 
 /// The picture's top left pixel in a preview.

@@ -19,6 +19,7 @@ use exr::meta::attribute::{AttributeValue, Text};
 use super::{BayerPattern, FRAME_CONVENTION, FixedPointFormat, StokesMetadata};
 use crate::ImageError;
 use crate::error::FileContext;
+use crate::exr_file::text;
 
 const PREFIX: &str = "brewster:";
 const SCHEMA: i32 = 1;
@@ -47,11 +48,6 @@ pub(super) fn from_metadata(m: &StokesMetadata) -> HashMap<Text, AttributeValue>
     ];
     let all = always.into_iter().chain(optional.into_iter().flatten());
     all.map(|(name, value)| (Text::from(format!("{PREFIX}{name}").as_str()), value)).collect()
-}
-
-/// UTF-8 bytes: the crate's own conversion knows Latin-1 only.
-fn text(value: &str) -> AttributeValue {
-    AttributeValue::Text(Text::from_slice_unchecked(value.as_bytes()))
 }
 
 fn numbers(values: &[f64]) -> AttributeValue {

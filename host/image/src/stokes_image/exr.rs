@@ -3,31 +3,25 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, Layer, LayerAttributes, SmallVec, WritableImage};
+use exr::prelude::FlatSamples;
 
 use super::attributes::{Attributes, from_metadata};
 use super::{Color, ColorPlanes, StokesImage};
 use crate::ImageError;
-use crate::atomic::write_atomically;
 use crate::error::FileContext;
-use crate::exr_file::{self, ENCODING};
+use crate::exr_file::{self, PlaneRef};
 use crate::picture::open;
 
 pub(super) fn save(image: &StokesImage, path: &Path) -> Result<(), ImageError> {
-    let mut channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = SmallVec::new();
-    for planes in &image.colors {
-        let name = planes.color.name();
-        let channel = |plane: &str, samples| AnyChannel::new(format!("{plane}.{name}").as_str(), samples);
-        channels.extend(planes.float_planes().map(|(plane, v)| channel(plane, FlatSamples::F32(v.clone()))));
-        // OpenEXR has no 8-bit channels; its uint is 32 bits wide, and run lengths make the zeros vanish.
-        let flags = planes.flags.iter().map(|f| f.iter().map(|&b| u32::from(b)).collect());
-        channels.extend(flags.map(|f| channel("FLAGS", FlatSamples::U32(f))));
-    }
-    let attributes = LayerAttributes { other: from_metadata(&image.metadata), ..LayerAttributes::default() };
-    let size = (image.width, image.height);
-    let layer = Layer::new(size, attributes, ENCODING, AnyChannels::sort(channels));
-    let file = Image::from_layer(layer);
-    write_atomically(path, |out| file.write().to_buffered(out).map_err(|e| exr_file::write_error(path, e)))
+    // OpenEXR has no 8-bit channels; its uint is 32 bits wide, and run lengths make the zeros vanish.
+    let wide = |flags: &Vec<u8>| flags.iter().map(|&f| u32::from(f)).collect::<Vec<u32>>();
+    let flags: Vec<Option<Vec<u32>>> = image.colors.iter().map(|c| c.flags.as_ref().map(wide)).collect();
+    let channels = image.colors.iter().zip(&flags).flat_map(|(planes, flags)| {
+        let floats = planes.float_planes().map(|(plane, v)| (plane, PlaneRef::F32(v)));
+        let all = floats.chain(flags.iter().map(|f| ("FLAGS", PlaneRef::U32(f))));
+        all.map(|(plane, samples)| (format!("{plane}.{}", planes.color.name()), samples))
+    });
+    exr_file::save(path, (image.width, image.height), channels, from_metadata(&image.metadata))
 }
 
 pub(super) fn load(path: &Path) -> Result<StokesImage, ImageError> {

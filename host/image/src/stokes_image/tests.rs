@@ -111,6 +111,20 @@ fn exr_gives_back_the_same_bits() {
 }
 
 #[test]
+fn the_same_image_is_the_same_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| {
+        let path = folder.path().join(name);
+        mono().save_exr(&path).unwrap();
+        std::fs::read(path).unwrap()
+    };
+    let first = file("0.exr");
+    for i in 1..8 {
+        assert!(file(&format!("{i}.exr")) == first, "the order of the attributes is their names'");
+    }
+}
+
+#[test]
 fn another_frame_convention_is_refused() {
     let upside_down = "picture: x right, y down, clockwise";
     let loaded = load_changed(|l| set(l, "brewster:frame", AttributeValue::Text(upside_down.into())));
