@@ -72,6 +72,16 @@ impl<'a> Case<'a> {
         self.field(key)?.as_str().with_context(|| format!("{key} is not text"))
     }
 
+    pub(super) fn flag(&self, key: &str) -> Result<bool> {
+        self.field(key)?.as_bool().with_context(|| format!("{key} is neither true nor false"))
+    }
+
+    /// A list of words.
+    pub(super) fn texts(&self, key: &str) -> Result<Vec<&'a str>> {
+        let texts = self.field(key)?.as_array().and_then(|list| list.iter().map(Value::as_str).collect());
+        texts.with_context(|| format!("{key} is not a list of text"))
+    }
+
     /// A list of objects inside this one.
     pub(super) fn list(&self, key: &'a str) -> Result<Vec<Self>> {
         let list = self.field(key)?.as_array().with_context(|| format!("{key} is not a list"))?;

@@ -32,7 +32,7 @@ const RINGS: [(u32, [&str; 3], [f64; 3]); 4] = [
     (32, ["32 rings, median of s0", "32 rings, of s0", "32 rings, irradiance"], [2e-6, 1e-4, 1e-5]),
 ];
 
-type Sky = Polarized<ClearSky, Rayleigh>;
+pub(super) type Sky = Polarized<ClearSky, Rayleigh>;
 
 /// What stands in a case besides its results.
 struct Scene {
@@ -62,7 +62,7 @@ impl Scene {
     }
 }
 
-fn sky(case: &Case) -> Result<Sky> {
+pub(super) fn sky(case: &Case) -> Result<Sky> {
     let sun = case.unit("sun")?;
     Ok(Polarized { light: clear(sun), pattern: Rayleigh::new(sun, case.number("pmax")?)? })
 }
@@ -149,7 +149,7 @@ fn fixed_points(
 
 /// The noise-free pixels of the inverse family from their truth: oblique and near-normal views of tilted facets, three
 /// albedos each. Against the noise a fit will see (0.003 of s0) eight rings miss by a third at worst, sixteen by a fiftieth.
-pub(super) fn inverse(case: &Case, report: &mut Report) -> Result<()> {
+pub(super) fn noise_free(case: &Case, report: &mut Report) -> Result<()> {
     let truth = case.object("truth")?;
     let normal = truth.unit("n")?;
     let ggx = Ggx::new(truth.number("alpha")?, Masking::HeightCorrelated)?;

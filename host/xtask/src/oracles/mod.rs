@@ -7,6 +7,7 @@
 
 mod case;
 mod integrals;
+mod inverse;
 mod mitsuba;
 mod mueller;
 mod pointwise;
@@ -38,11 +39,7 @@ const FAMILIES: [Family; 12] = [
     Family { name: "stokes_wls", evaluate: stokes::least_squares, remark: "" },
     Family { name: "dolp_bias", evaluate: stokes::dolp_bias, remark: "" },
     Family { name: "eq6_integrals", evaluate: integrals::eq6, remark: integrals::SHADOWED_EDGE },
-    Family {
-        name: "inverse",
-        evaluate: integrals::inverse,
-        remark: "only the forward model is checked, from truth to noise-free Stokes: the fit does not exist yet",
-    },
+    Family { name: "inverse", evaluate: inverse::joint, remark: inverse::REMARK },
     Family { name: "smooth_fresnel_mueller", evaluate: mitsuba::smooth, remark: "" },
     Family { name: "bsdf_mueller", evaluate: mitsuba::rough, remark: "" },
     Family { name: "mc_reference", evaluate: mitsuba::renders, remark: "" },

@@ -7,6 +7,7 @@ use std::fmt;
 enum Measure {
     Worst,
     Median,
+    Rms,
 }
 
 /// One check of a family.
@@ -68,6 +69,11 @@ impl Report {
         self.note(check);
     }
 
+    /// Errors whose root mean square over the file must not exceed `bound`.
+    pub(super) fn rms(&mut self, what: &'static str, bound: f64, error: f64) {
+        self.note(Check { what, bound, measure: Measure::Rms, worst: error, at: "rms".into(), errors: vec![error] });
+    }
+
     /// Takes in the checks of other cases of the file.
     pub(super) fn merge(mut self, other: Self) -> Self {
         for check in other.checks {
@@ -104,6 +110,10 @@ impl Check {
     fn error(&self) -> f64 {
         match self.measure {
             Measure::Worst => self.worst,
+            Measure::Rms => {
+                let count: f64 = self.errors.iter().map(|_| 1.0).sum();
+                (self.errors.iter().map(|error| error * error).sum::<f64>() / count).sqrt()
+            }
             Measure::Median => {
                 let mut sorted = self.errors.clone();
                 sorted.sort_by(f64::total_cmp);
