@@ -14,6 +14,7 @@ pub struct LinearMueller(pub [[f64; 3]; 3]);
 
 impl LinearMueller {
     /// The light after it.
+    #[inline]
     #[must_use]
     pub fn apply(&self, s: [f64; 3]) -> [f64; 3] {
         self.0.map(|[a, b, c]| a * s[0] + b * s[1] + c * s[2])
@@ -33,6 +34,7 @@ pub struct Reflection {
 
 impl Reflection {
     /// At the facet that mirrors `wi` into `wo` (unit, away from the surface). Retro-reflection and grazing included.
+    #[inline]
     #[must_use]
     pub fn at_facet(ior: Ior, wi: DVec3, incident: &Frame, wo: DVec3, outgoing: &Frame) -> Self {
         let s = s_axis(wi, wo);
@@ -50,6 +52,7 @@ impl Reflection {
     }
 
     /// Linear light (L, Q, U), s3 = 0, after the reflection: the product of the matrices without forming them.
+    #[inline]
     #[must_use]
     pub fn apply(&self, light: [f64; 3]) -> [f64; 3] {
         let [l, q, u] = self.into_plane.apply_linear(light);
@@ -80,6 +83,7 @@ pub struct Microfacet {
 
 impl Microfacet {
     /// f_r without Fresnel, D G2/(4 n·ω_i n·ω_o), per steradian; 0 unless both directions are above the surface.
+    #[inline]
     #[must_use]
     pub fn factor(&self, wi: DVec3, wo: DVec3, normal: DVec3) -> f64 {
         let (i, o) = (Incidence::between(normal, wi), Incidence::between(normal, wo));

@@ -29,12 +29,14 @@ impl Incidence {
     }
 
     /// Between two unit vectors: c = n·v, s² = |n × v|².
+    #[inline]
     #[must_use]
     pub fn between(normal: DVec3, direction: DVec3) -> Self {
         Self { cosine: normal.dot(direction), sine_squared: normal.cross(direction).length_squared() }
     }
 
     /// On the facet that mirrors unit `wi` into unit `wo`: c = |ω_i + ω_o|/2, s² = |ω_i − ω_o|²/4.
+    #[inline]
     #[must_use]
     pub fn on_facet(wi: DVec3, wo: DVec3) -> Self {
         Self { cosine: 0.5 * (wi + wo).length(), sine_squared: 0.25 * (wi - wo).length_squared() }
@@ -68,6 +70,7 @@ impl Turn {
     }
 
     /// To the direction (c, s) of any non-zero length, as seen from (1, 0).
+    #[inline]
     #[must_use]
     pub fn towards(c: f64, s: f64) -> Self {
         let scale = c.abs().max(s.abs());
@@ -80,12 +83,14 @@ impl Turn {
     }
 
     /// By −α.
+    #[inline]
     #[must_use]
     pub fn inverse(self) -> Self {
         Self { cos: self.cos, sin: -self.sin }
     }
 
     /// By α and then by `next`.
+    #[inline]
     #[must_use]
     pub fn then(self, next: Self) -> Self {
         Self { cos: self.cos * next.cos - self.sin * next.sin, sin: self.sin * next.cos + self.cos * next.sin }
@@ -93,12 +98,14 @@ impl Turn {
 
     /// M_rot(α) on (Q, U), paper eq. 3: takes Stokes given in a frame whose x axis lies at α in the target frame into
     /// the target frame.
+    #[inline]
     #[must_use]
     pub fn apply(self, [q, u]: [f64; 2]) -> [f64; 2] {
         [self.cos * q - self.sin * u, self.sin * q + self.cos * u]
     }
 
     /// M_rot(α) on linear Stokes (L, Q, U).
+    #[inline]
     #[must_use]
     pub fn apply_linear(self, [l, q, u]: [f64; 3]) -> [f64; 3] {
         let [q, u] = self.apply([q, u]);
@@ -125,6 +132,7 @@ pub struct Frame {
 impl Frame {
     /// Frame of light that arrives from the sky out of unit direction ω: x = normalize(ω × z), y up. At the poles,
     /// where ω × z vanishes, x = (0, −1, 0), which is the limit along the azimuth of +x.
+    #[inline]
     #[must_use]
     pub fn sky(direction: DVec3) -> Self {
         let x = sky_axis(direction);
@@ -151,6 +159,7 @@ impl Frame {
     }
 
     /// Where `axis` (across the beam, of any non-zero length) points in this frame.
+    #[inline]
     #[must_use]
     pub fn turn_to(&self, axis: DVec3) -> Turn {
         Turn::towards(axis.dot(self.x), axis.dot(self.y))
@@ -175,6 +184,7 @@ pub fn direction(v: DVec3) -> Result<DVec3, OpticsError> {
 ///
 /// At retro-reflection (and straight transmission) it is arbitrary; one axis across both beams is returned, which
 /// leaves every product M_rot M_ref M_rot unchanged as long as it is used on both sides.
+#[inline]
 #[must_use]
 pub fn s_axis(wi: DVec3, wo: DVec3) -> DVec3 {
     // (ω_i − ω_o) × (ω_i + ω_o) = 2 ω_i × ω_o, whose factors are exact differences where the product is small.
@@ -182,6 +192,7 @@ pub fn s_axis(wi: DVec3, wo: DVec3) -> DVec3 {
 }
 
 /// Unit vectors (t, b) across unit `normal` with t × b = normal.
+#[inline]
 #[must_use]
 pub fn tangents(normal: DVec3) -> (DVec3, DVec3) {
     normal.any_orthonormal_pair()
@@ -189,6 +200,7 @@ pub fn tangents(normal: DVec3) -> (DVec3, DVec3) {
 
 /// Parallel transport along the great circle of a vector `v` across unit `from`, to unit `to`. Between antipodes no great
 /// circle is the shortest; `v`, which lies across both, stays what it is.
+#[inline]
 #[must_use]
 pub fn transport(v: DVec3, from: DVec3, to: DVec3) -> DVec3 {
     let apart = 1.0 + from.dot(to);

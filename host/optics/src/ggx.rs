@@ -73,18 +73,21 @@ impl Ggx {
 
 impl<T: Real> Ggx<T> {
     /// α.
+    #[inline]
     #[must_use]
     pub fn alpha(&self) -> T {
         self.alpha
     }
 
     /// How masking and shadowing combine.
+    #[inline]
     #[must_use]
     pub fn masking(&self) -> Masking {
         self.masking
     }
 
     /// D(h), per steradian; 0 for facets that look down. ∫ D cos θ_h dω = 1.
+    #[inline]
     #[must_use]
     pub fn d(&self, h: Incidence<T>) -> T {
         if h.cosine <= T::ZERO {
@@ -94,6 +97,7 @@ impl<T: Real> Ggx<T> {
     }
 
     /// ∂D/∂α = 2α (s² − α²c²)/(π (α²c² + s²)³).
+    #[inline]
     #[must_use]
     pub fn d_by_alpha(&self, h: Incidence<T>) -> T {
         if h.cosine <= T::ZERO {
@@ -115,6 +119,7 @@ impl<T: Real> Ggx<T> {
     }
 
     /// Smith Λ = x/(2 (1 + √(1 + x))), x = α² tan² θ; infinite at and below the horizon.
+    #[inline]
     #[must_use]
     pub fn lambda(&self, v: Incidence<T>) -> T {
         if v.cosine <= T::ZERO {
@@ -125,6 +130,7 @@ impl<T: Real> Ggx<T> {
     }
 
     /// ∂Λ/∂α = α s²/(2c √(c² + α²s²)).
+    #[inline]
     #[must_use]
     pub fn lambda_by_alpha(&self, v: Incidence<T>) -> T {
         if v.cosine <= T::ZERO {
@@ -134,12 +140,14 @@ impl<T: Real> Ggx<T> {
     }
 
     /// G1 = 1/(1 + Λ), in [0, 1].
+    #[inline]
     #[must_use]
     pub fn g1(&self, v: Incidence<T>) -> T {
         if v.cosine <= T::ZERO { T::ZERO } else { T::TWO * v.cosine / (v.cosine + self.slant(v)) }
     }
 
     /// G2 in [0, 1]; 0 if either direction is at or below the horizon.
+    #[inline]
     #[must_use]
     pub fn g2(&self, i: Incidence<T>, o: Incidence<T>) -> T {
         if i.cosine <= T::ZERO || o.cosine <= T::ZERO {
@@ -153,6 +161,7 @@ impl<T: Real> Ggx<T> {
 
     /// G2/(4 cos θ_i cos θ_o), which stays finite where the cosines vanish: with r = √(c² + α²s²),
     /// 1/(2 (c_o r_i + c_i r_o)) height-correlated, 1/((c_i + r_i)(c_o + r_o)) separable.
+    #[inline]
     #[must_use]
     pub fn visibility(&self, i: Incidence<T>, o: Incidence<T>) -> T {
         if i.cosine <= T::ZERO || o.cosine <= T::ZERO {
@@ -166,6 +175,7 @@ impl<T: Real> Ggx<T> {
     }
 
     /// ∂/∂α of [`Self::visibility`].
+    #[inline]
     #[must_use]
     pub fn visibility_by_alpha(&self, i: Incidence<T>, o: Incidence<T>) -> T {
         if i.cosine <= T::ZERO || o.cosine <= T::ZERO {
@@ -190,6 +200,7 @@ impl<T: Real> Ggx<T> {
 
     /// Density per steradian of h of [`Ggx::sample_visible`]: G1(ω_o) D(h) (ω_o·h)/(n·ω_o). For ω_i mirrored at h divide
     /// by 4 (ω_o·h).
+    #[inline]
     #[must_use]
     pub fn visible_density(&self, o: Incidence<T>, h: Incidence<T>, o_dot_h: T) -> T {
         if o.cosine <= T::ZERO {
@@ -200,22 +211,26 @@ impl<T: Real> Ggx<T> {
     }
 
     /// G2/G1(ω_o), the weight f_r (n·ω_i)/density of a sampled visible normal, in [0, 1]; finite at grazing ω_o.
+    #[inline]
     #[must_use]
     pub fn visible_weight(&self, i: Incidence<T>, o: Incidence<T>) -> T {
         T::TWO * i.cosine * (o.cosine + self.slant(o)) * self.visibility(i, o)
     }
 
     /// αc² + s²/α = 1/√(πD), which has fewer roundings than α²c² + s².
+    #[inline]
     fn spread(&self, h: Incidence<T>) -> T {
         (self.alpha * (h.cosine * h.cosine) + h.sine_squared / self.alpha).at_least(T::HALF * self.alpha)
     }
 
     /// r = √(c² + α²s²) = c (1 + 2Λ).
+    #[inline]
     fn slant(&self, v: Incidence<T>) -> T {
         (v.cosine * v.cosine + self.alpha * self.alpha * v.sine_squared).sqrt().at_least(T::HALF * self.alpha)
     }
 
     /// r² rounded once, for derivatives: they divide by r three times.
+    #[inline]
     fn slant_squared(&self, v: Incidence<T>) -> T {
         let (c2, c2_low) = v.cosine.product(v.cosine);
         let (a2, a2_low) = self.alpha.product(self.alpha);

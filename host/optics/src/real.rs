@@ -44,9 +44,9 @@ pub trait Real:
     #[must_use]
     fn sqrt(self) -> Self;
 
-    /// √(self² + other²) without overflow or underflow on the way.
+    /// |self| with the sign of `other`: bits, where a comparison of angles would be a branch that no processor foresees.
     #[must_use]
-    fn hypot(self, other: Self) -> Self;
+    fn with_sign(self, other: Self) -> Self;
 
     /// The product rounded, and what the rounding took off.
     #[must_use]
@@ -82,11 +82,12 @@ pub trait Real:
         self * self
     }
 
-    /// self/denominator, and 0 where the denominator is below [`Self::TINY`]: such a quotient belongs to no angle.
+    /// self/denominator where the denominator is not below [`Self::TINY`], the quotient by that elsewhere: finite, and 0 for
+    /// 0/0, for what vanishes at least as fast as its denominator. No branch.
     #[inline]
     #[must_use]
     fn over(self, denominator: Self) -> Self {
-        if denominator > Self::TINY { self / denominator } else { Self::ZERO }
+        self / denominator.at_least(Self::TINY)
     }
 }
 
@@ -113,8 +114,8 @@ impl Real for f64 {
     }
 
     #[inline]
-    fn hypot(self, other: Self) -> Self {
-        self.hypot(other)
+    fn with_sign(self, other: Self) -> Self {
+        self.copysign(other)
     }
 
     /// Dekker 1971: both factors split into halves of 26 bits, whose products are exact.
@@ -149,8 +150,8 @@ impl Real for f32 {
     }
 
     #[inline]
-    fn hypot(self, other: Self) -> Self {
-        self.hypot(other)
+    fn with_sign(self, other: Self) -> Self {
+        self.copysign(other)
     }
 
     /// The product of two f32 is exact in f64.

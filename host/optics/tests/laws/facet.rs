@@ -123,6 +123,44 @@ fn frames(wi: DVec3, wo: DVec3, roll: f64) -> (Frame, Frame) {
     (Frame::sky(wi), Frame::camera(wo, x).unwrap())
 }
 
+/// Elementary symmetric polynomials of the eigenvalues of Cloude's coherency matrix, scaled to trace 1, of a Mueller matrix whose
+/// fourth row and column are 0; none for the zero matrix.
+fn coherency_coefficients(m: &[[f64; 3]; 3]) -> Vec<f64> {
+    if m[0][0] <= 0.0 {
+        return Vec::new();
+    }
+    // σ of s0 (power), s1 (x − y) and s2 (diagonal); all of them real.
+    let sigma: [[[f64; 2]; 2]; 3] = [[[1.0, 0.0], [0.0, 1.0]], [[1.0, 0.0], [0.0, -1.0]], [[0.0, 1.0], [1.0, 0.0]]];
+    let mut h = [[0.0; 4]; 4];
+    for (j, row) in m.iter().enumerate() {
+        for (k, x) in row.iter().enumerate() {
+            for (a, line) in h.iter_mut().enumerate() {
+                for (b, entry) in line.iter_mut().enumerate() {
+                    *entry += 0.25 * x / m[0][0] * sigma[j][a / 2][b / 2] * sigma[k][a % 2][b % 2];
+                }
+            }
+        }
+    }
+    let product = |p: &[[f64; 4]; 4], q: &[[f64; 4]; 4]| {
+        let entry = |a: usize, b: usize| (0..4).map(|k| p[a][k] * q[k][b]).sum::<f64>();
+        [0, 1, 2, 3].map(|a| [0, 1, 2, 3].map(|b| entry(a, b)))
+    };
+    let mut power = h;
+    let mut traces = Vec::new();
+    for _ in 0..4 {
+        traces.push((0..4).map(|k| power[k][k]).sum::<f64>());
+        power = product(&power, &h);
+    }
+    // e_n = 1/n Σ (−1)^(i − 1) e_(n − i) p_i.
+    let mut e = vec![1.0];
+    for n in 1..=4_u32 {
+        let sum: f64 =
+            (1..=n).map(|i| if i % 2 == 1 { 1.0 } else { -1.0 } * e[(n - i) as usize] * traces[i as usize - 1]).sum();
+        e.push(sum / f64::from(n));
+    }
+    e
+}
+
 proptest! {
     #[test]
     fn linear_light_stays_physical_and_finite(
@@ -215,6 +253,36 @@ proptest! {
         let light = [1.0, (2.0 * chi).cos() * (2.0 * psi).cos(), (2.0 * chi).cos() * (2.0 * psi).sin(), (2.0 * chi).sin()];
         let [s0, s1, s2, s3] = m.apply(protocol_polar::Stokes(light)).0;
         prop_assert!((s1.hypot(s2).hypot(s3) - s0).abs() <= 1e-12 * m00, "what was fully polarized stays so");
+    }
+
+    /// The body depolarizes and is still realizable: Cloude's coherency matrix H = ¼ Σ m_jk σ_j ⊗ σ_k* of the 4 × 4 matrix (Gil
+    /// and Ossikovski, 5.4) has no negative eigenvalue. Without a fourth row and column m is a column times a row, so H is
+    /// ¼ (c·σ) ⊗ (r·σ)*, whose eigenvalues are products of (c0 ± |c|)/2 and (r0 ± |r|)/2.
+    #[test]
+    fn a_body_is_realizable(
+        wi in above(), wo in above(), eta in 1.0..3.0_f64, albedo in 0.0..=1.0_f64, roll in 0.0..6.0_f64,
+    ) {
+        let (incident, outgoing) = frames(wi, wo, roll);
+        let body = PolarizedDiffuse { ior: Dielectric::new(eta).unwrap(), albedo };
+        let m = body.linear(wi, &incident, wo, &outgoing, DVec3::Z).0;
+        let m00 = m[0][0];
+        let spread = |[_, q, u]: [f64; 3]| q.hypot(u);
+        let (column, row) = ([m00, m[1][0], m[2][0]], m[0]);
+        // One column times one row: every entry is m_j0 m_0k/m00.
+        for j in 0..3 {
+            for k in 0..3 {
+                prop_assert!((m[j][k] * m00 - column[j] * row[k]).abs() <= 1e-15 * m00 * m00, "{m:?}");
+            }
+        }
+        for sign in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
+            let eigenvalue = 0.25 * (m00 + sign[0] * spread(column)) * (m00 + sign[1] * spread(row));
+            prop_assert!(eigenvalue >= -1e-15 * m00 * m00, "{eigenvalue} of {m:?}");
+        }
+        // The same without knowing its form: tr H^k, k = 1 to 4, and Newton's identities give the coefficients of the
+        // characteristic polynomial, which are all >= 0 for a Hermitian matrix exactly where no eigenvalue is negative.
+        for coefficient in coherency_coefficients(&m) {
+            prop_assert!(coefficient >= -1e-12, "{coefficient} of {m:?}");
+        }
     }
 
     /// World, camera and light turned together change nothing.

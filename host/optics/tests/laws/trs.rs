@@ -2,7 +2,7 @@
 
 use core::f64::consts::{FRAC_PI_2, PI};
 use host_optics::trs::{MirrorFacet, Sinusoid, aligned, brewster, unpolarized};
-use host_optics::{Dielectric, Incidence};
+use host_optics::{Dielectric, Incidence, Reflection, Turn};
 use proptest::prelude::*;
 use protocol_polar::{Degrees, Radians};
 
@@ -42,6 +42,27 @@ fn eq_9_as_printed_is_wrong() {
         })
         .fold(0.0, f64::max);
     assert!(worst > 0.1, "as printed it must disagree with the Mueller product, or the erratum is ours: {worst}");
+}
+
+/// Light polarized across the s axis, around the Brewster angle, keeps the digits of the little that is reflected: s0 = L R∥ and
+/// −s1 is the same to the bit. ½(R⊥ + R∥) − ½(R⊥ − R∥) would be off by 1e-17 R⊥ whatever R∥ is.
+#[test]
+fn light_across_the_s_axis_keeps_its_digits_at_brewster() {
+    for (eta, away) in [1.1, 1.5, 2.4].into_iter().flat_map(|eta| [0.0, 1e-9, 1e-6, -1e-3].map(|away| (eta, away))) {
+        let f = facet(eta, f64::atan(eta) + away, 1.0, FRAC_PI_2, 0.0);
+        let [s0, s1, s2, _] = f.stokes().0;
+        let expected = f.radiance * f.reflectance.parallel;
+        // cos 2ψ_i = −1 is exact; sin 2ψ_i is off by 1e-16.
+        assert!((s0 - expected).abs() <= 1e-15 * expected, "{eta} {away}: {s0} {expected}");
+        assert!(
+            (s1 + expected).abs() <= 1e-15 * expected
+                && s2.abs() <= 1e-15 * f.reflectance.rr_cos_delta.abs() * f.radiance
+        );
+
+        let reflection = Reflection { into_plane: Turn::NONE, reflectance: f.reflectance, out_of_plane: Turn::NONE };
+        let [l, q, u] = reflection.apply([f.radiance, -f.radiance, 0.0]);
+        assert!((l - expected).abs() <= 1e-15 * expected && (q + expected).abs() <= 1e-15 * expected && u == 0.0);
+    }
 }
 
 proptest! {
