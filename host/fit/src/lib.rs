@@ -4,12 +4,26 @@
 //! picture's frame (x right, y up, angles counter-clockwise). Signals are linear in light. Arithmetic is f64, planes are
 //! stored in f32.
 
+pub mod closed;
+pub mod compare;
+pub mod direct;
 mod error;
+pub mod forward;
+pub mod joint;
 mod levels;
+pub mod light;
+pub mod maps;
+pub mod material;
 mod mosaic;
+pub mod pipeline;
 mod polarization;
+pub mod register;
+pub mod relight;
+pub mod session;
 mod statistics;
 mod stokes;
+pub mod tiles;
+pub mod wheel;
 
 pub use error::FitError;
 pub use levels::{ToneCurve, flat_field_gain, low_percentile};
