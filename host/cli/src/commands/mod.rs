@@ -2,11 +2,14 @@
 
 mod calibrate;
 mod capture;
+mod compare;
 mod completions;
 mod demo;
 mod devices;
 mod fetch;
+mod fit;
 mod info;
+mod render;
 mod simulate;
 mod stokes;
 
@@ -22,6 +25,9 @@ pub(crate) enum Command {
     Calibrate(calibrate::Calibrate),
     Stokes(Box<stokes::Stokes>),
     Simulate(simulate::Simulate),
+    Fit(Box<fit::Fit>),
+    Render(Box<render::Render>),
+    Compare(compare::Compare),
     Info(info::Info),
     Devices(devices::Devices),
     Completions(completions::Completions),
@@ -37,6 +43,9 @@ impl Command {
             Self::Devices(command) => command.run(terminal),
             Self::Stokes(command) => command.run(terminal),
             Self::Simulate(command) => command.run(terminal),
+            Self::Fit(command) => command.run(terminal),
+            Self::Render(command) => command.run(terminal),
+            Self::Compare(command) => command.run(terminal),
             Self::Info(command) => command.run(),
             Self::Completions(command) => Ok(command.run()),
         }

@@ -33,6 +33,13 @@ pub(crate) struct OutputArgs {
     force: bool,
 }
 
+impl OutputArgs {
+    /// The folder that was named.
+    pub(crate) fn output(&self) -> Option<&PathBuf> {
+        self.output.as_ref()
+    }
+}
+
 /// A folder that is being filled.
 pub(crate) struct OutputFolder {
     /// The final name as people know it.

@@ -13,6 +13,9 @@ pub(crate) struct Filling {
 
 static FILLING: Mutex<Option<Filling>> = Mutex::new(None);
 
+/// What stays for the next run, in words.
+static KEPT: Mutex<Option<String>> = Mutex::new(None);
+
 impl Filling {
     /// Removes the folder, then the parents that were made for it; those that are not empty stay.
     pub(super) fn remove(&self) {
@@ -27,6 +30,11 @@ impl Filling {
             let _ = std::fs::remove_dir(p);
         });
     }
+}
+
+/// From now on a signal ends the program with this advice; with none, unfinished results are gone.
+pub(crate) fn keeping(advice: Option<String>) {
+    *KEPT.lock().unwrap_or_else(PoisonError::into_inner) = advice;
 }
 
 /// Keeps a signal waiting for as long as the guard lives; it holds what is to be removed.
@@ -45,12 +53,13 @@ pub(crate) fn stand_back() {}
 
 #[cfg(unix)]
 mod unix {
+    use std::sync::PoisonError;
     use std::sync::atomic::{AtomicBool, Ordering};
 
     use signal_hook::consts::{SIGINT, SIGTERM};
     use signal_hook::iterator::Signals;
 
-    use super::hold;
+    use super::{KEPT, hold};
     use crate::exit::Exit;
     use crate::failure::Failure;
     use crate::terminal::Terminal;
@@ -70,7 +79,9 @@ mod unix {
                 filling.remove();
             }
             let what = format!("stopped by {}", if signal == SIGINT { "SIGINT" } else { "SIGTERM" });
-            Terminal::new(false, json).fail(&Failure::new(exit, what, "Unfinished results were removed."));
+            let kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            let advice = kept.unwrap_or_else(|| "Unfinished results were removed.".to_owned());
+            Terminal::new(false, json).fail(&Failure::new(exit, what, advice));
             std::process::exit(exit.code().into());
         });
     }

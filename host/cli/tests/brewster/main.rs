@@ -4,8 +4,10 @@
 mod bad_input;
 mod broken_line;
 mod camera;
+mod fit;
 mod good_input;
 mod output;
 mod real_data;
+mod relight;
 mod simulate;
 mod world;

@@ -1,5 +1,10 @@
 //! `brewster demo`: the whole way once, without a camera.
 
+mod session;
+mod stone;
+
+use std::path::Path;
+
 use clap::Args;
 use firmware_emulator::{Source, wheel_chart};
 use host_image::StokesImage;
@@ -13,10 +18,12 @@ use crate::failure::Failure;
 use crate::output::{OutputArgs, OutputFolder};
 use crate::terminal::{Outcome, Terminal};
 
-/// Show the whole way with an emulated camera: capture, transfer, verification, pictures
+/// Show the whole way without a camera: capture, verification and pictures; then fit and rendering of a simulated stone
 ///
 /// The camera's real firmware looks at a wheel of polarizer film whose answer is known: the angle of polarization is the
-/// direction one looks in from the hub. Writes what `brewster capture` writes, and how far it is from the truth.
+/// direction one looks in from the hub. Writes what `brewster capture` writes, and how far it is from the truth. Then frames
+/// of a stone under a polarized sky are simulated, its material fitted, put under another sun, and compared with the truth:
+/// all in the folder stone.
 #[derive(Args)]
 pub(crate) struct Demo {
     #[command(flatten)]
@@ -37,6 +44,15 @@ impl Demo {
         let truth = wheel_chart(identity.sensor.width, identity.sensor.height);
         let id = take(&mut opened, request, terminal)?;
         let received = receive(&mut opened, id, true, terminal)?;
+        let stone = stone::run(&folder.path().join("stone"), terminal)?;
+        let extra = |image: &StokesImage| {
+            let (mut facts, mut json) = against_truth(image, &truth);
+            facts.extend(stone.facts.iter().cloned());
+            if let Some(object) = json.as_object_mut() {
+                object.insert("stone".into(), stone.json.clone());
+            }
+            (facts, json)
+        };
         let delivery = Delivery {
             command: "demo",
             title: (
@@ -46,9 +62,14 @@ impl Demo {
                  spots that clip.",
             ),
             args: &DeliveryArgs { verify: true, raw: false, keep: false },
-            extra: Some(&|image| against_truth(image, &truth)),
+            extra: Some(&extra),
         };
-        deliver(&mut opened, &received, folder, &delivery, terminal)
+        let mut outcome = deliver(&mut opened, &received, folder, &delivery, terminal)?;
+        let output = outcome.json.get("output").and_then(Value::as_str).unwrap_or_default();
+        let page = Path::new(output).join("stone").join("report.html");
+        let line = format!("  {:<40} the stone: maps, renderings and errors\n{}", page.display(), stone.text);
+        outcome.text.push_str(&line);
+        Ok(outcome)
     }
 }
 
