@@ -3,6 +3,7 @@
 //! Every step prints what it does and how long it took; all steps run, and the failed ones are named again at the end.
 
 mod arrows;
+mod captures;
 mod docs;
 mod licenses;
 mod metadata;
@@ -60,14 +61,26 @@ enum Step {
         #[arg(long)]
         write: bool,
     },
+    /// Every rendered capture and the simulated ink print through the whole fit, against the truth; writes docs/ACCURACY.md
+    Captures {
+        /// Folder of captures [default: captures in $BREWSTER_SHARED, or in ../shared beside the workspace]
+        folder: Option<PathBuf>,
+    },
+    /// Whether intervals hold the truth as often as they say, over 10⁵ simulated pixels; writes docs/ACCURACY.md
+    Coverage,
+    /// The fit's speed, and the same pixels fitted by scipy; writes docs/ACCURACY.md
+    FitPeer,
     /// Dependency arrows between the crates of this workspace
     Arrows,
     /// Licenses of all dependencies, stricter on the device's side
     Licenses,
     /// The device's crates built for a microcontroller with core and alloc only
     NoStd,
-    /// Kernel benchmark and its peers; writes docs/PERFORMANCE.md
-    Perf,
+    /// Measures what things cost, beside other programs; writes docs/PERFORMANCE.md
+    Perf {
+        /// Only these parts of it
+        sections: Vec<perf::Section>,
+    },
 }
 
 impl Step {
@@ -84,10 +97,13 @@ impl Step {
             Self::Numerics { .. } => "numerics",
             Self::Oracles { .. } => "oracles",
             Self::Ulp { .. } => "ulp",
+            Self::Captures { .. } => "captures",
+            Self::Coverage => "coverage",
+            Self::FitPeer => "fit-peer",
             Self::Arrows => "arrows",
             Self::Licenses => "licenses",
             Self::NoStd => "no-std",
-            Self::Perf => "perf",
+            Self::Perf { .. } => "perf",
         }
     }
 
@@ -101,10 +117,13 @@ impl Step {
             Self::Numerics { write } => numerics::run(*write),
             Self::Oracles { folder, strict } => oracles::run(folder.as_deref(), *strict),
             Self::Ulp { write } => ulp::run(*write),
+            Self::Captures { folder } => captures::run(folder.as_deref()),
+            Self::Coverage => captures::coverage(),
+            Self::FitPeer => captures::peer(),
             Self::Arrows => arrows::check(),
             Self::Licenses => licenses::check(),
             Self::NoStd => no_std::check(),
-            Self::Perf => perf::run(),
+            Self::Perf { sections } => perf::run(sections),
         }
     }
 }
