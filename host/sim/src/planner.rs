@@ -5,15 +5,20 @@
 //! s0 that has itself grown by at most the factors before. The planner tries every subset and takes the one that saves the
 //! most time within the budget.
 //!
-//! Interpolation errs too. It is measured and not proved; a tenth of the tolerance is kept for it on either side.
+//! Interpolation errs too, which is measured and not proved: a fifth of the tolerance is kept for it, and it is asked to err by no
+//! more than a third of what the effects left out have not used up. Two pictures are compared, so half would be all of it; the
+//! rest is for pixels between those at which interpolation was measured.
 
 use crate::optical::{Evaluation, OpticalFacts, PixelMap, Renderer, Rendering, SceneLight, Surface};
 use crate::{Assessment, Effect, EffectSet};
 use host_optics::OpticsError;
 use std::time::Duration;
 
-/// Share of the tolerance that evaluation itself may use up, in each of two pictures that are compared.
-const EVALUATION_SHARE: f64 = 0.1;
+/// Share of the tolerance that is kept for evaluation.
+const EVALUATION_SHARE: f64 = 0.2;
+
+/// Part of what effects left out have not used up that the evaluation of one picture may err by.
+const EVALUATION_PART: f64 = 1.0 / 3.0;
 
 /// Differences are not asked of pixels darker than this share of the picture's mean s0: relative to nothing they mean nothing.
 const DARK: f64 = 0.01;
@@ -75,7 +80,7 @@ impl Plan {
     /// The cheapest set of effects within `tolerance` of the full picture.
     #[must_use]
     pub fn new(facts: &OpticalFacts<'_>, tolerance: f64) -> Self {
-        let budget = tolerance * (1.0 - 2.0 * EVALUATION_SHARE);
+        let budget = tolerance * (1.0 - EVALUATION_SHARE);
         let assess = |effect, on| facts.assess(effect, on).map(|assessment| (effect, assessment));
         let alone: Vec<(Effect, Assessment)> =
             Effect::OPTICAL.into_iter().filter_map(|effect| assess(effect, EffectSet::ALL)).collect();
@@ -114,7 +119,7 @@ impl Plan {
             };
             Row { effect, assessment, on, why }
         };
-        let evaluation = Evaluation::Prefiltered { tolerance: EVALUATION_SHARE * tolerance };
+        let evaluation = Evaluation::Prefiltered { tolerance: EVALUATION_PART * (tolerance - bound) };
         let rows = alone.clone().into_iter().map(row).collect();
         Self { tolerance, effects, evaluation, bound, rows }
     }

@@ -205,15 +205,21 @@ impl Turns {
 
     /// M_rot(φ) M_ref M_rot(−ψ) on (L, Q, U).
     fn apply<const POLARIZED: bool>(&self, r: &Reflectance, [l, q, u]: [f64; 3]) -> [f64; 3] {
-        let (mean, half) = (0.5 * (r.perpendicular + r.parallel), 0.5 * (r.perpendicular - r.parallel));
         let [oc, os] = self.out;
+        let (along, diagonal) = if POLARIZED {
+            let [c, s] = self.into;
+            (c * q + s * u, c * u - s * q)
+        } else {
+            (0.0, 0.0)
+        };
+        // Along the s axis and across it: no cancellation, as in [`crate::trs::MirrorFacet::stokes`].
+        let (perpendicular, parallel) = (0.5 * r.perpendicular * (l + along), 0.5 * r.parallel * (l - along));
+        let s1 = perpendicular - parallel;
         if !POLARIZED {
-            return [mean * l, half * l * oc, half * l * os];
+            return [perpendicular + parallel, s1 * oc, s1 * os];
         }
-        let [c, s] = self.into;
-        let (along, diagonal) = (c * q + s * u, c * u - s * q);
-        let (s1, s2) = (half * l + mean * along, r.rr_cos_delta * diagonal);
-        [mean * l + half * along, oc * s1 - os * s2, os * s1 + oc * s2]
+        let s2 = r.rr_cos_delta * diagonal;
+        [perpendicular + parallel, oc * s1 - os * s2, os * s1 + oc * s2]
     }
 }
 

@@ -92,9 +92,15 @@ impl Axis {
     /// First of the four nodes around a coordinate, and their weights (Lagrange, exact for cubics).
     pub(crate) fn cubic(&self, x: f32) -> (usize, [f32; 4]) {
         let (first, t) = cell((x - self.origin) * self.per_unit - 1.0, self.nodes - 4);
-        let (a, b, c, d) = (t + 1.0, t, t - 1.0, t - 2.0);
-        (first, [-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0])
+        (first, lagrange(t))
     }
+}
+
+/// Weights of nodes at −1, 0, 1 and 2 for a value at t, exact for cubics.
+#[inline]
+pub(crate) fn lagrange(t: f32) -> [f32; 4] {
+    let (a, b, c, d) = (t + 1.0, t, t - 1.0, t - 2.0);
+    [-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0]
 }
 
 /// Values on a grid over a chart, N numbers a node.

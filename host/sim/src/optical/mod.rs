@@ -15,6 +15,7 @@ mod diffuse_field;
 pub mod effects;
 mod facts;
 mod light;
+mod lune;
 pub(crate) mod numbers;
 mod render;
 mod specular;

@@ -4,15 +4,16 @@ use super::Surface;
 use super::chart::Field;
 use super::effects::normal_variation;
 use super::light::{BandLight, SunPoints};
+use super::lune::{LEAST_ALPHA, Lune};
 use super::numbers::single3;
 use super::sun_lobe;
 use super::survey::Pixels;
-use super::table::{Lanes, Table, lanes};
+use super::table::{Lanes, Over, Table, lanes};
 use crate::{Effect, EffectSet};
 use glam::{DVec3, Vec3};
 use host_optics::integral::{Adaptive, FixedPoints, View, discrete};
 use host_optics::prefilter::{Fineness, Pyramid, Reflector, Rgb, Sources};
-use host_optics::{Light, Microfacet};
+use host_optics::{Frame, Incidence, Light, Microfacet, Reflection};
 
 /// How paper eq. 6 is evaluated where the surface is rough. A surface without its roughness is a mirror under any of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +59,7 @@ pub enum Method {
 pub(crate) enum Rule {
     Mirror,
     Cells(Fineness),
+    Lune(Lune),
     Points(FixedPoints),
     Adaptive(Adaptive),
 }
@@ -90,8 +92,15 @@ const NARROW: f64 = 2.0;
 
 /// Test pixels of a table.
 const TESTS: usize = 32;
+/// First step between nodes of ω_o, radians.
+const VIEW_STEP: f64 = 0.09;
+/// Normals that differ by no more, as a chord, are one.
+const EQUAL_NORMALS: f64 = 1e-6;
 /// Halvings of a grid's step before it is given up.
 const REFINEMENTS: usize = 5;
+
+/// Error of a table's nodes, as a share of what its interpolation may err by.
+const NODE_SHARE: f64 = 0.1;
 
 /// A sum over cells errs as the square of their size: 0.1 of the lobe's width is good to about 1e-3 of s0 under a map with a low
 /// sun, 0.2 to 3e-3.
@@ -99,7 +108,7 @@ fn fineness(tolerance: f64) -> Fineness {
     Fineness((10.0 * tolerance).sqrt().clamp(0.03, 0.3))
 }
 
-/// Rings at the nodes of a table under a smooth sky, whose error is well below the table's.
+/// Rings at the nodes of a table under a smooth sky where the lobe is too narrow for a [`Lune`].
 fn node_rings(tolerance: f64) -> u32 {
     if tolerance >= 2e-4 { 12 } else { 16 }
 }
@@ -117,6 +126,9 @@ impl Rule {
             return Self::Mirror;
         }
         match evaluation {
+            Evaluation::Prefiltered { tolerance } if smooth && surface.ggx.alpha() >= LEAST_ALPHA => {
+                Self::Lune(Lune::new(surface.ggx.alpha(), NODE_SHARE * tolerance))
+            }
             // Where the lobe is narrower than a texel, cells would be seen as points.
             Evaluation::Prefiltered { tolerance } if smooth || surface.ggx.alpha() < 1.5 * texel => {
                 Self::Points(FixedPoints::new(node_rings(tolerance)))
@@ -141,6 +153,7 @@ impl Point<'_> {
                 Some(sky) => self.reflector.specular(sky, *fineness, normal, &view),
                 None => [[0.0; 3]; 3],
             },
+            Rule::Lune(rule) => self.over_lune(rule, normal, &view),
             Rule::Points(rule) => self.bands(|band, surface| rule.specular(band, surface, normal, &view)),
             Rule::Adaptive(rule) => self.bands(|band, surface| rule.specular(band, surface, normal, &view).value),
         };
@@ -175,6 +188,34 @@ impl Point<'_> {
     fn bands(&self, value: impl Fn(&BandLight<'_>, &Microfacet) -> [f64; 3]) -> Rgb {
         let one = |k: usize| value(&self.light[k], &Microfacet { ior: self.surface.ior[k], ggx: self.surface.ggx });
         if self.gray { [one(0); 3] } else { [one(0), one(1), one(2)] }
+    }
+
+    /// The sum over a lune's directions, whose geometry and polarization the bands share. For light by formulas.
+    fn over_lune(&self, rule: &Lune, normal: DVec3, view: &View) -> Rgb {
+        let wo = view.direction;
+        let mut sum = [[0.0; 3]; 3];
+        if normal.dot(wo) <= 0.0 {
+            return sum;
+        }
+        let ior = self.surface.ior;
+        let facets = Microfacet { ior: ior[0], ggx: self.surface.ggx };
+        let bands = if self.gray { 1 } else { 3 };
+        for (wi, solid_angle) in rule.points(normal, wo) {
+            let weight = facets.factor(wi, wo, normal) * normal.dot(wi) * solid_angle;
+            // One pattern is put on the radiance of all bands.
+            let [_, q, u] = self.light[0].with_radiance([1.0, 0.0, 0.0], wi);
+            let mut reflection = Reflection::at_facet(ior[0], wi, &Frame::sky(wi), wo, &view.frame);
+            for k in 0..bands {
+                if k > 0 && ior[k] != ior[k - 1] {
+                    reflection.reflectance = ior[k].reflectance(Incidence::on_facet(wi, wo));
+                }
+                let l = weight * self.light[k].radiance(wi);
+                for (total, s) in sum[k].iter_mut().zip(reflection.apply([l, l * q, l * u])) {
+                    *total += s;
+                }
+            }
+        }
+        if self.gray { [sum[0]; 3] } else { sum }
     }
 
     /// The sun's disk in points that follow the lobe, where that is not much wider than the disk.
@@ -217,8 +258,8 @@ impl Specular {
         if matches!(point.rule, Rule::Mirror) && (!smooth || sun) {
             return (Self::Direct, Method::Direct);
         }
-        let flat = !effects.contains(Effect::NormalVariation);
-        let limit = pixels.extent.pixels / 2 + 64;
+        let flat = !effects.contains(Effect::NormalVariation) || pixels.extent.normal_radius < EQUAL_NORMALS;
+        let limit = pixels.extent.pixels / 4 * 3 + 64;
         // One normal leaves two coordinates of four.
         let count = if flat { TESTS / 2 } else { TESTS };
         let mut tests = pixels.some(count);
@@ -227,19 +268,25 @@ impl Specular {
             let reach = 4.0 * point.surface.ggx.alpha() + point.sun.angular_radius;
             tests.extend(pixels.mirroring(point.sun.center, reach, count));
         }
-        let mut step = if smooth { 0.15 } else { point.surface.ggx.alpha().clamp(0.01, 0.15) };
-        for _ in 0..REFINEMENTS {
+        let over = if smooth { Over::Normal } else { Over::Mirror };
+        // Between nodes of the chart, and of ω_o.
+        let mut steps = [if smooth { 0.15 } else { point.surface.ggx.alpha().clamp(0.01, 0.15) }, VIEW_STEP];
+        let bumpy = over == Over::Normal && !flat;
+        let mut axis = usize::from(bumpy && pixels.extent.normal_radius < 0.3 * steps[0]);
+        let (mut before, mut last, mut stuck) = (steps, f64::INFINITY, false);
+        for _ in 0..if bumpy { 2 * REFINEMENTS } else { REFINEMENTS } {
             let (plan, nodes) = if flat {
                 let normal = normal_variation::mean(pixels.extent);
-                let size = pixels.view.size() / step + 4.0;
+                let size = pixels.view.size() / steps[0] + 4.0;
                 if size * size > super::numbers::real(limit) {
                     break;
                 }
-                let field = Field::build(pixels.view_chart, &pixels.view, step, |wo| lanes(&point.at(normal, wo)));
+                let field = Field::build(pixels.view_chart, &pixels.view, steps[0], |wo| lanes(&point.at(normal, wo)));
                 let nodes = field.nodes();
                 (Self::Flat(field), nodes)
             } else {
-                let Some(table) = Table::build(pixels, step, limit, |n, wo| point.at(n, wo)) else { break };
+                let node = |n: DVec3, wo: DVec3| point.at(n, wo);
+                let Some(table) = Table::build(pixels, over, steps, tolerance, limit, node) else { break };
                 let nodes = table.computed();
                 (Self::Table(table), nodes)
             };
@@ -247,8 +294,27 @@ impl Specular {
             if error <= tolerance {
                 return (plan, Method::Table { nodes, error });
             }
-            // Cubic interpolation: the error falls as the fourth power of the step.
-            step *= if error > 20.0 * tolerance { 0.4 } else { 0.6 };
+            if bumpy && error > 0.7 * last {
+                // A finer step was no use: the other one is what errs, or both.
+                if !stuck {
+                    steps = before;
+                }
+                (stuck, axis) = (true, 1 - axis);
+            } else {
+                stuck = false;
+            }
+            (before, last) = (steps, error.min(last));
+            // Cubic interpolation: the error falls as the fourth power of the step, a little more slowly in practice.
+            steps[axis] *= match axis {
+                1 => 0.75,
+                _ if bumpy => (0.6 * tolerance / error).powf(0.3).clamp(0.35, 0.85),
+                _ if error > 20.0 * tolerance => 0.4,
+                _ => 0.6,
+            };
+            if bumpy && axis == 0 {
+                // Steps longer than the chart are one.
+                steps[0] = steps[0].min(1.2 * pixels.extent.normal_radius);
+            }
         }
         (Self::Direct, Method::Direct)
     }
