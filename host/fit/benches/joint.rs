@@ -142,16 +142,16 @@ fn joint<F: Forward>(
     settings: &Settings,
     start: impl Fn(usize, Option<&Fit>) -> Vec<Facets> + Sync,
 ) -> Vec<Fit> {
-    let row = |row: usize| {
+    let row = |(row, pixels): (usize, &[Vec<Observation>])| {
         let (mut fits, mut last) = (Vec::with_capacity(COLUMNS), None::<Fit>);
-        for k in row * COLUMNS..(row + 1) * COLUMNS {
-            let found = fit(forward, &pixels[k], &start(k, last.as_ref()), settings);
+        for (column, pixel) in pixels.iter().enumerate() {
+            let found = fit(forward, pixel, &start(row * COLUMNS + column, last.as_ref()), settings);
             last = Some(found);
             fits.push(found);
         }
         fits
     };
-    (0..ROWS).into_par_iter().flat_map_iter(row).collect()
+    pixels.par_chunks(COLUMNS).enumerate().flat_map_iter(row).collect()
 }
 
 fn main() {

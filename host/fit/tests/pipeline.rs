@@ -1,7 +1,11 @@
 //! The whole fit on a drawn session: a flat plastic with albedo that varies, under a polarized sky, drawn by quadrature
 //! ([`Direct`], which the fit's tables know nothing of), seen from two sides behind a polarizer.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests fail by panicking, as tests do")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::cast_possible_truncation,
+    reason = "helpers of tests fail by panicking, as tests do; drawn pictures are f32"
+)]
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -245,7 +249,7 @@ fn closed_modes_go_the_same_way() {
         let ([eta, _, normal, green], _) = errors(&maps);
         println!("{mode:?}: eta, normal, albedo off by {eta:.4} {normal:.4} {green:.4}");
         let limit = if mode == Mode::SkyAware { 2.0 } else { 8.0 };
-        assert!(normal < limit && green < 0.05 && maps.views.iter().any(|v| *v == 3));
+        assert!(normal < limit && green < 0.05 && maps.views.contains(&3));
         assert!(maps.plane(Plane::Chi2).iter().all(|c| c.is_nan()) && maps.freedom.iter().all(|f| *f == 0));
     }
 }

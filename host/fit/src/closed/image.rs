@@ -1,5 +1,7 @@
 //! Whole images: rows in parallel, eight pixels at a time.
 
+#![expect(clippy::needless_range_loop, reason = "one index walks several arrays side by side")]
+
 use super::kernel::{Found, solve};
 use super::phase::Seen;
 use super::real::{LANES, Lanes, Real, Triple, Work, along, cross, dot, single, times};

@@ -4,6 +4,8 @@
 //! First-order propagation: the noise of one band of one view is split along its phase (δp) and across it (δφ); weights and the
 //! sky's radiance count as constants.
 
+#![expect(clippy::needless_range_loop, reason = "one index walks several arrays side by side")]
+
 use super::fresnel::{ETA, Fresnel, Inverse};
 use super::phase::{Phase, Seen, phase};
 use super::plane::intersect;

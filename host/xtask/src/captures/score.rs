@@ -111,7 +111,7 @@ fn row(session: &Session, wheels: &[Option<WheelEstimate>], reference: &Referenc
     let maps = fitted(&prepared, mode)?;
     let seconds = [ready, start.elapsed().as_secs_f64()];
     // Closed forms never know a roughness; that alone does not refuse their answers.
-    let refuse = if mode.is_joint() { u32::MAX } else { u32::MAX & !Reasons::ROUGHNESS.0 };
+    let refuse = if mode.is_joint() { u32::MAX } else { !Reasons::ROUGHNESS.0 };
     let comparison = compare(&maps, reference, CompareOptions { refuse, resample: true })?;
     Ok(Row { way, comparison, seconds })
 }
