@@ -90,7 +90,8 @@ pub struct FitOptions {
     pub starts: Starts,
     /// Cells along the sample's longer side; as fine as the sharpest view if `None`.
     pub resolution: Option<usize>,
-    /// Repair poses that are off by a pixel or more.
+    /// Repair poses that are off by a pixel or more. What differs between views besides the pose (shading, lobes) moves good
+    /// poses by 0.25 to 0.45 pixels: of a bumpy sample the intervals then cover 44 % where they should cover 68 %.
     pub refine: bool,
     /// Keep the covariance of each pixel.
     pub covariance: bool,
@@ -119,7 +120,7 @@ impl Default for FitOptions {
             loss: Loss::default(),
             starts: Starts::default(),
             resolution: None,
-            refine: true,
+            refine: false,
             covariance: false,
             tile: 64,
         }

@@ -157,7 +157,7 @@ impl Fit {
                 Starts::All => joint::Starts::All,
             },
             resolution: self.resolution,
-            refine: !self.no_refine,
+            refine: self.refine,
             covariance: self.covariance,
             tile: self.tile,
             ..usual

@@ -86,9 +86,9 @@ pub(crate) struct Fit {
     /// From where to search: neighbors, also elsewhere where nothing fits, or everywhere (finds second minima; slow)
     #[arg(long, value_enum, default_value_t = Starts::Auto, help_heading = "Search")]
     starts: Starts,
-    /// Take poses as they are
+    /// Repair poses from the pictures: for poses that are off by a pixel or more; good ones become worse by some 0.3 pixels
     #[arg(long, help_heading = "Search")]
-    no_refine: bool,
+    refine: bool,
     /// Samples of a tile's side
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=4096), help_heading = "Large fits")]
     tile: u32,
