@@ -183,7 +183,7 @@ pub fn difference(stokes: &[[[f32; 3]; 3]], full: &[[[f32; 3]; 3]]) -> (f64, f64
 }
 
 /// The relative noise of s0 where it is least: at a full well, from `frames` equispaced polarizer angles of unpolarized light,
-/// √((w + r²)/N)/w with the well w and the read noise r in electrons. `brewster` plans to a tenth of it.
+/// √((w + r²)/N)/w with the well w and the read noise r in electrons. A tolerance of a tenth of it hides in the noise.
 #[must_use]
 pub fn camera_noise(full_well_e: f64, read_noise_e: f64, frames: u32) -> f64 {
     ((full_well_e + read_noise_e * read_noise_e) / f64::from(frames.max(1))).sqrt() / full_well_e

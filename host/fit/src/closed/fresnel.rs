@@ -90,7 +90,7 @@ impl<R: Real> Inverse<R> {
     ///
     /// With q = c y², √D = N/M, N = 2cs y (y² − 1), M = (y² + 1)(c² y² + s²). The start is the closed inverse of R⊥ = D (the
     /// paper's, exact at the Brewster angle): y² = (1 + √D)/(1 − √D). Three of Halley's steps on N/M, each with one division,
-    /// take R∥ off: within 4e-6 for incidences up to 89° and η up to 3. The bands go step by step together: one alone is a
+    /// take R∥ off: within 6e-6 for incidences up to 89° and η up to 3. The bands go step by step together: one alone is a
     /// chain of instructions that wait for each other.
     #[inline(always)]
     pub(super) fn eta(&self, difference: [R; BANDS]) -> [R; BANDS] {

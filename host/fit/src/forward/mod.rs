@@ -73,7 +73,7 @@ pub struct TableOptions {
     pub body: Body,
     /// Masking of facets.
     pub masking: Masking,
-    /// Error of s0 aimed at, in the median, where memory allows; one in twenty errs by up to three times as much, near a sun
+    /// Error of s0 aimed at, in the median, where memory allows; one in twenty errs by two to six times as much, near a sun
     /// or at grazing views more. [`ViewReport`] tells what was reached.
     pub tolerance: f64,
     /// Most bytes of one view's table: grids of the smallest α are coarsened until they fit.

@@ -1,8 +1,8 @@
 //! The document and its sections: each between marks, replaced as a whole.
 
+use crate::perf::{machine, replaced};
 use crate::process;
-use anyhow::{Context, Result, bail};
-use std::path::Path;
+use anyhow::{Context, Result};
 
 pub(super) const FILE: &str = "docs/ACCURACY.md";
 
@@ -52,7 +52,8 @@ pub(super) fn write(section: Section, text: &str) -> Result<()> {
         if path.is_file() { std::fs::read_to_string(&path).with_context(|| FILE.to_owned())? } else { empty() };
     let date = process::output(process::command("date").args(["-u", "+%F"]), "date")?;
     let body = format!("`{}` on {}; {}.\n\n{}", section.command(), date.trim(), machine(), text);
-    std::fs::write(&path, replaced(&document, section.name(), &body)?).with_context(|| FILE.to_owned())
+    std::fs::write(&path, replaced(FILE, &document, section.name(), &format!("{}\n", body.trim_end()))?)
+        .with_context(|| FILE.to_owned())
 }
 
 /// A document without results.
@@ -68,13 +69,6 @@ fn empty() -> String {
         ));
     }
     text
-}
-
-fn replaced(document: &str, name: &str, text: &str) -> Result<String> {
-    let (begin, end) = (format!("<!-- {name} -->\n"), format!("<!-- end {name} -->"));
-    let Some((before, rest)) = document.split_once(&begin) else { bail!("{FILE} has no {}", begin.trim()) };
-    let Some((_, after)) = rest.split_once(&end) else { bail!("{FILE} has no {end}") };
-    Ok(format!("{before}{begin}{}\n{end}{after}", text.trim_end()))
 }
 
 /// Lines with an empty one where a table, a title or a list begins or ends.
@@ -96,14 +90,6 @@ pub(super) fn spaced(lines: &[&str]) -> String {
     text
 }
 
-fn machine() -> String {
-    let info = std::fs::read_to_string(Path::new("/proc/cpuinfo")).unwrap_or_default();
-    let field = |name: &str| info.lines().find_map(|line| line.strip_prefix(name)?.split_once(": "));
-    let model = field("model name").map_or("an unnamed processor", |(_, model)| model);
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    format!("{model}, {cores} cores")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -111,10 +97,10 @@ mod tests {
     #[test]
     fn sections_are_replaced_and_the_rest_stays() {
         let document = empty();
-        let once = replaced(&document, "inks", "a\n\n").unwrap();
+        let once = replaced(FILE, &document, "inks", "a\n").unwrap();
         assert!(once.contains("<!-- inks -->\na\n<!-- end inks -->\n\n## Intervals"));
-        assert_eq!(replaced(&once, "inks", "a").unwrap(), once);
-        assert!(replaced(&document, "nothing", "").is_err());
+        assert_eq!(replaced(FILE, &once, "inks", "a\n").unwrap(), once);
+        assert!(replaced(FILE, &document, "nothing", "").is_err());
     }
 
     #[test]

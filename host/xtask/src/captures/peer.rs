@@ -2,10 +2,10 @@
 
 use super::document::{self, Section};
 use crate::metadata::Metadata;
+use crate::perf::python;
 use crate::process;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
-use std::path::PathBuf;
 
 const SCRIPT: &str = "host/xtask/perf/fit_peer.py";
 const BENCH: &str = "cargo bench -p host-fit --bench joint";
@@ -75,7 +75,7 @@ pub(crate) fn run() -> Result<String> {
     process::run(process::command(&process::cargo_program()).args(bench).arg("--dump").arg(&file), BENCH)?;
     let problem: Problem = serde_json::from_str(&std::fs::read_to_string(&file)?)?;
     println!("  {SCRIPT}");
-    let mut script = process::command(&python(folder.join("venv"))?.to_string_lossy());
+    let mut script = process::command(&python(&PACKAGES)?.to_string_lossy());
     let text = process::output(script.arg(SCRIPT).arg(&file), SCRIPT)?;
     let peer: Peer = serde_json::from_str(&text).with_context(|| format!("{SCRIPT} printed something else"))?;
     document::write(Section::Peer, &section(&rows, &problem, &peer))?;
@@ -89,20 +89,6 @@ pub(crate) fn run() -> Result<String> {
 
 fn agrees(direct: &Agreement) -> bool {
     direct.median_sigma <= AGREEMENT_SIGMA[0] && direct.worst_sigma <= AGREEMENT_SIGMA[1]
-}
-
-/// numpy and scipy in a virtual environment, installed on first use.
-fn python(environment: PathBuf) -> Result<PathBuf> {
-    let (python, installed) = (environment.join("bin/python"), environment.join("installed"));
-    if !installed.exists() {
-        println!("  installing {} into a virtual environment", PACKAGES.join(", "));
-        process::run(process::command("python3").args(["-m", "venv"]).arg(&environment), "python3 -m venv")?;
-        let mut pip = process::command(&python.to_string_lossy());
-        pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]).args(PACKAGES);
-        process::run(&mut pip, "pip install")?;
-        std::fs::write(&installed, PACKAGES.join("\n"))?;
-    }
-    Ok(python)
 }
 
 fn section(rows: &str, problem: &Problem, peer: &Peer) -> String {

@@ -36,6 +36,10 @@ impl Section {
         }
     }
 
+    fn mark(self) -> String {
+        format!("perf {}", self.name())
+    }
+
     fn measure(self) -> Result<String> {
         match self {
             Self::Kernel => kernel::section(),
@@ -54,18 +58,18 @@ pub(crate) fn run(sections: &[Section]) -> Result<String> {
         let date = process::output(process::command("date").args(["-u", "+%F"]), "date")?;
         let by = format!("`cargo xtask perf {}` on {}; {}.", section.name(), date.trim(), machine());
         let document = std::fs::read_to_string(&path).with_context(|| FILE.to_owned())?;
-        let replaced = replaced(&document, section.name(), &format!("{}\n{by}\n", measured.trim_end()))?;
+        let replaced = replaced(FILE, &document, &section.mark(), &format!("{}\n{by}\n", measured.trim_end()))?;
         std::fs::write(&path, replaced).with_context(|| FILE.to_owned())?;
     }
     let names: Vec<&str> = sections.iter().map(|section| section.name()).collect();
     Ok(format!("{FILE}: {}", names.join(", ")))
 }
 
-/// The document with what stands between the marks of `name` replaced.
-fn replaced(document: &str, name: &str, text: &str) -> Result<String> {
-    let (begin, end) = (format!("<!-- perf {name} -->\n"), format!("<!-- end {name} -->"));
-    let Some((before, rest)) = document.split_once(&begin) else { bail!("{FILE} has no {}", begin.trim()) };
-    let Some((_, after)) = rest.split_once(&end) else { bail!("{FILE} has no {end}") };
+/// The `document` called `file` with what stands between the two marks of `mark` replaced.
+pub(crate) fn replaced(file: &str, document: &str, mark: &str, text: &str) -> Result<String> {
+    let (begin, end) = (format!("<!-- {mark} -->\n"), format!("<!-- end {mark} -->"));
+    let Some((before, rest)) = document.split_once(&begin) else { bail!("{file} has no {}", begin.trim()) };
+    let Some((_, after)) = rest.split_once(&end) else { bail!("{file} has no {end}") };
     Ok(format!("{before}{begin}{text}{end}{after}"))
 }
 
@@ -81,7 +85,7 @@ fn bench(package: &str, name: &str, arguments: &[&str]) -> Result<String> {
 }
 
 /// Python with `packages`, in a virtual environment below the target directory; installed on first use.
-fn python(packages: &[&str]) -> Result<PathBuf> {
+pub(crate) fn python(packages: &[&str]) -> Result<PathBuf> {
     let environment = target()?.join(format!("venv-{}", packages.first().unwrap_or(&"")));
     let python = environment.join("bin/python");
     let installed = environment.join("installed");
@@ -101,7 +105,7 @@ fn target() -> Result<PathBuf> {
     Ok(Metadata::load()?.target_directory.join("perf"))
 }
 
-fn machine() -> String {
+pub(crate) fn machine() -> String {
     let info = std::fs::read_to_string(Path::new("/proc/cpuinfo")).unwrap_or_default();
     let field = |name: &str| info.lines().find_map(|line| line.strip_prefix(name)?.split_once(": "));
     let model = field("model name").map_or("an unnamed processor", |(_, model)| model);
@@ -149,7 +153,7 @@ mod tests {
     fn every_section_has_its_place() {
         let document = std::fs::read_to_string(process::root().join(FILE)).unwrap();
         for section in Section::ALL {
-            let new = replaced(&document, section.name(), "measured\n").unwrap();
+            let new = replaced(FILE, &document, &section.mark(), "measured\n").unwrap();
             assert_eq!(new.matches("measured\n<!-- end").count(), 1, "{section:?}");
             assert_eq!(new.matches("<!-- perf").count(), Section::ALL.len());
         }

@@ -36,7 +36,7 @@ pub(crate) struct Simulate {
     view: Views,
     /// Largest error of s0, s1 and s2 against the full simulation, as a share of s0: a number, or a part of this camera's noise
     ///
-    /// Time grows steeply below 0.005: noise/10 of an ordinary camera is about 0.0001.
+    /// Time grows steeply below 0.0005: noise/10 of an ordinary camera is about 0.0001.
     #[arg(long, value_name = "T|noise|noise/N", default_value_t)]
     tolerance: Tolerance,
     /// Print which effects are simulated, and why
